@@ -6,7 +6,6 @@ from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.spatial import cKDTree
 
 from sandmould.analysis.tube_fill import sand_in_bore
 from sandmould.geometry.geometry import Array, Bore
@@ -103,6 +102,8 @@ def mixing_index(
 
 def _unlike_share(position_m: Array, layer: NDArray[np.int64]) -> float:
     """Mean share of grains of another layer among the nearest neighbours."""
+    from scipy.spatial import cKDTree
+
     n, dimension = position_m.shape
     neighbours = min(6 if dimension == 2 else 12, n - 1)
     nearest = cKDTree(position_m).query(position_m, k=neighbours + 1)[1]

@@ -7,9 +7,6 @@ from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.ndimage import binary_closing, label
-from scipy.sparse import coo_array
-from scipy.sparse.csgraph import connected_components
 
 from sandmould.engines.neighbours import touching_pairs
 
@@ -87,6 +84,9 @@ def lying(position_m: Array, radius_m: Array, floor_m: float) -> NDArray[np.bool
     -------
     (n,) bool
     """
+    from scipy.sparse import coo_array
+    from scipy.sparse.csgraph import connected_components
+
     n = len(radius_m)
     if not n:
         return np.zeros(0, dtype=np.bool_)
@@ -292,6 +292,8 @@ def connected(surface: Surface, depth_m: float, start: NDArray[np.bool_]) -> NDA
     (m,) bool
         Deep points that deep neighbours, over gaps of two cells at most, join to a start.
     """
+    from scipy.ndimage import binary_closing, label
+
     cells = tuple(len(np.unique(along)) for along in surface.point_m.T)
     deep = (surface.height_m > depth_m).reshape(cells)
     # a closing at the edge of the grid needs room beyond it

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import numpy as np
-from scipy.spatial import ConvexHull, QhullError
 
 from sandmould.geometry.geometry import Array, Block, Solid
 from sandmould.geometry.mesh import TriangleMesh
@@ -59,6 +58,8 @@ def convex_section(corners_m: Array, cut_m: float) -> Array:
         points_m = (a + step[:, None] * (b - a))[:, [0, 2]]
     if len(points_m) < 3:
         return np.zeros((0, 2))
+    from scipy.spatial import ConvexHull, QhullError  # a third of a second
+
     try:
         return points_m[ConvexHull(points_m).vertices]
     except QhullError:

@@ -226,12 +226,21 @@ def pack(
             "--last-state", help="Leave out exports and all snapshots but the last: no films."
         ),
     ] = False,
+    outside_files: Annotated[
+        bool,
+        typer.Option(
+            "--outside-files", help="Take copies of files from outside the study's folder along."
+        ),
+    ] = False,
 ) -> None:  # fmt: skip
     """Pack the finished runs of a study into one file."""
     from sandmould.execution.packs.pack import pack as pack_study
     from sandmould.study.plan.build_plan import RESULTS, open_plan
 
-    typer.echo(pack_study(open_plan(study), RESULTS, output, last_state=last_state))
+    plan = open_plan(study)
+    typer.echo(
+        pack_study(plan, RESULTS, output, last_state=last_state, outside_files=outside_files)
+    )
 
 
 @app.command(epilog="Example: sandmould unpack runs.zip")

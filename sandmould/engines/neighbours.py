@@ -6,7 +6,6 @@ from collections.abc import Iterator
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.spatial import cKDTree
 
 from sandmould.geometry.geometry import Array
 
@@ -30,6 +29,8 @@ def near_pairs(
         Indices of the grains of each pair.
     distance_m : (p,) float64, m
     """
+    from scipy.spatial import cKDTree  # a third of a second
+
     n = len(position_m)
     if n < 2:
         return

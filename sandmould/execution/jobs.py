@@ -15,9 +15,8 @@ from pathlib import Path
 from types import FrameType
 from typing import Any, TextIO
 
-from sandmould.called_kernels import loaded_kernels
 from sandmould.definition.run import LAST_MEASURED, Run
-from sandmould.execution.loading import keep_loaded
+from sandmould.execution.loading import keep_loaded, loaded
 from sandmould.execution.locks import computing
 from sandmould.execution.pool import SERVER_LOST, do, start_server
 from sandmould.execution.simulate import RESTARTABLE_EXIT, measure, render, simulate, write_crash
@@ -178,7 +177,7 @@ def _simulate(folder: Path, ranks: int, mpi: str, run: Run | None = None) -> int
         if ranks > 1:
             status = _in_ranks(folder, ranks, mpi, lock)
         else:
-            run, before = run or read_run(folder / "scenario.yaml"), loaded_kernels()
+            run, before = run or read_run(folder / "scenario.yaml"), loaded()
             status = simulate(folder, run)
             keep_loaded(run.scenario, before)
         return ASKED_EXIT if status == RESTARTABLE_EXIT and is_asked() else status

@@ -3,11 +3,13 @@
 from __future__ import annotations
 
 import contextlib
+import sys
 from typing import Any
 
-from sandmould.called_kernels import keep_kernels, kept_kernels, load_kernels, loaded_kernels
 from sandmould.kinds.registry import kind_of
 from sandmould.runs.provenance import commit, processor, versions
+
+_COMPILING = "sandmould.compiled"
 
 
 def load_for(scenario: Any) -> None:
@@ -22,15 +24,29 @@ def load_for(scenario: Any) -> None:
     kind.execution.load_computing(scenario)
     kind.execution.load_measuring(scenario)
     with contextlib.suppress(Exception):  # a damaged list; what is not loaded is compiled later
-        load_kernels(kept_kernels(_class_of(scenario)) - loaded_kernels())
+        if _COMPILING in sys.modules:
+            from sandmould.called_kernels import kept_kernels, load_kernels
+
+            load_kernels(kept_kernels(_class_of(scenario)) - loaded())
     kind.planning.template_hash(scenario)
     for asked_once in (commit, versions, processor):
         asked_once()
 
 
+def loaded() -> set[str]:
+    """Compiled code that this process has called; what compiles is not imported to ask."""
+    if _COMPILING not in sys.modules:
+        return set()
+    from sandmould.called_kernels import loaded_kernels
+
+    return loaded_kernels()
+
+
 def keep_loaded(scenario: Any, before: set[str]) -> None:
     """Note for later servers what a run has called that was not loaded before."""
-    if new := loaded_kernels() - before:
+    if new := loaded() - before:
+        from sandmould.called_kernels import keep_kernels
+
         keep_kernels(_class_of(scenario), new)
 
 

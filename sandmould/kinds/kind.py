@@ -48,6 +48,8 @@ class UserProgram(ABC, Generic[ScenarioT]):
 
     shipped: Path
     """Folder of those that come with us."""
+    copied: str
+    """Folder of a run that takes copies of its files."""
 
     @abstractmethod
     def files(self, scenario: ScenarioT) -> Mapping[str, Path]:

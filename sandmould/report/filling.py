@@ -7,8 +7,8 @@ from dataclasses import dataclass
 
 import numpy as np
 import pandas as pd
+import scipy
 from numpy.typing import NDArray
-from scipy.special import stdtrit
 
 from sandmould.analysis.filling import Limb, first_reach_s, fit_limbs
 from sandmould.definition.study import Study
@@ -193,5 +193,5 @@ def _limbs(table: _AtTimes, key: str, measure: str) -> str:
 
 def _exponent(limb: Limb) -> str:
     """An exponent with its 95 % interval, two degrees of freedom less than points."""
-    reach = float(stdtrit(limb.points - 2, 0.5 + CONFIDENCE / 2)) * limb.se
+    reach = float(scipy.special.stdtrit(limb.points - 2, 0.5 + CONFIDENCE / 2)) * limb.se
     return f"{with_margin(limb.exponent, reach)} ({limb.points} settings)"

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from pathlib import Path
 from typing import Any
 
 import pandas as pd
@@ -90,12 +91,13 @@ def sand_method(scenario: Scenario, keys: Sequence[str], summary: pd.DataFrame) 
 
 def deck_method(scenario: OwnDeck, keys: Sequence[str], summary: pd.DataFrame) -> tuple[Row, ...]:
     """What is known of the runs of a user's deck; see ``sand_method``."""
-    read = [f"{name_of(name)} from {column}" for name, column in scenario.measures.items()]
+    read = [f"{name_of(name)} from {taken.text}" for name, taken in scenario.taken.items()]
     given = [f"{name} = {value}" for name, value in scenario.values.items() if
              f"values.{name}" not in keys]  # fmt: skip
+    template, fixed = Path(scenario.template).name, listed(given, most=20) or "no fixed values"
     return (
         Row("Engine", _engines(summary)),
-        Row("Deck", f"{scenario.template}, with {listed(given, most=20) or 'no fixed values'}"),
+        Row("Deck", f"{template}, with {fixed}"),
         Row("Measures", listed(read, most=20) or "none"),
         Row("Swept", listed([name_of(k) for k in keys], most=20) or "nothing"),
         Row("Seeds", _seeds(summary)),

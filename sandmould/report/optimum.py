@@ -5,10 +5,10 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass, replace
 from pathlib import Path
+from statistics import NormalDist
 
 import numpy as np
 import pandas as pd
-from scipy.special import ndtri
 
 from sandmould.definition.certificate import frequency_key
 from sandmould.definition.study import Study
@@ -38,7 +38,7 @@ WRONG = {"frequency_hz": 10.0}
 """By how much a key may be set wrong in a foundry; others by a tenth of their range."""
 SHARE_LOST = 0.05
 """Of the best value, what counts as no worse where the study sets no margin."""
-TWO_SIDED = float(ndtri(0.5 + CONFIDENCE / 2))
+TWO_SIDED = NormalDist().inv_cdf(0.5 + CONFIDENCE / 2)
 """Standard errors on either side of a mean that its interval holds."""
 
 

@@ -4,9 +4,10 @@ from __future__ import annotations
 
 import os
 from pathlib import Path
-from typing import Annotated, Any
+from typing import Annotated, Any, Literal
 
-from pydantic import Field
+from pydantic import Field, model_validator
+from pydantic_core import PydanticCustomError
 
 from sandmould import ROOT
 from sandmould.scenario.engine import DeckReader
@@ -24,6 +25,48 @@ class DeckEngine(Section):
 
     name: DeckReader = quantity("lammps", "Engine that reads the deck.", source=ARGUED)
     ranks: int = quantity(1, "MPI ranks of one run; 1 on liggghts.", source=ARGUED, ge=1, le=4096)
+
+
+class Taken(Section):
+    """What a measure is taken from, and how."""
+
+    of: str = quantity(..., "Column of the engine's log, or of the dump.", source="user")
+    take: Literal["last", "mean", "rate"] = quantity(
+        "last",
+        "The last value, the mean over time, or the change over the window by its length in s.",
+        source="user",
+    )
+    over_last_s: float | None = quantity(
+        None, "Window that a mean or rate is taken over.", unit="s", source="user", gt=0
+    )
+    from_s: float | None = quantity(
+        None, "Time from which on it is taken, in place of over_last_s.", unit="s", source="user",
+        ge=0,
+    )  # fmt: skip
+    dump: str = quantity(
+        "", "Dump of text that the deck writes beside itself.", source="user",
+        pattern=r"^(\w[\w.-]*)?$",
+    )  # fmt: skip
+    grains: Literal["mean", "max", "min", "sum"] = quantity(
+        "mean", "What of the dumped grains counts at one moment.", source="user"
+    )
+
+    @model_validator(mode="after")
+    def _one_window(self) -> Taken:
+        windows = [self.over_last_s, self.from_s].count(None)
+        if windows == 0 or (self.take == "last" and windows < 2):
+            rule = "take: mean or take: rate with one of over_last_s and from_s"
+            raise PydanticCustomError("window", rule)
+        return self
+
+    @property
+    def text(self) -> str:
+        """In words."""
+        what = f"{self.grains} {self.of} of the grains in {self.dump}" if self.dump else self.of
+        window = f" from {self.from_s:g} s on" if self.from_s is not None else ""
+        if self.over_last_s is not None:
+            window = f" over the last {self.over_last_s:g} s"
+        return what if self.take == "last" else f"the {self.take} of {what}{window}"
 
 
 class OwnDeck(Section):
@@ -50,10 +93,11 @@ class OwnDeck(Section):
     values: dict[Annotated[str, Field(pattern=NAME)], Any] = Field(
         {}, description="Names that the template is given; any of them can be swept."
     )
-    measures: dict[Annotated[str, Field(pattern=NAME)], str] = Field(
+    measures: dict[Annotated[str, Field(pattern=NAME)], str | Taken] = Field(
         {},
-        description="Measures by name, and the column of the engine's log that each is read from, "
-        "such as fill_fraction: v_fill (LIGGGHTS heads it fill).",
+        description="Measures by name, which ends in the unit, and the column of the engine's log "
+        "that each is read from, such as fill_fraction: v_fill (LIGGGHTS heads it fill); or what "
+        "is taken of it.",
     )
     steps: int | None = quantity(
         None, "Time steps that the deck runs; progress and time left need it.", source="user", ge=1
@@ -70,6 +114,17 @@ class OwnDeck(Section):
         2000, "Memory that a cluster is asked for.", unit="MB", source=ARGUED, ge=100, le=10**7
     )
     seed: int = quantity(1, "Seed that the template is given.", source="user", ge=0, le=2**31 - 1)
+
+    @property
+    def taken(self) -> dict[str, Taken]:
+        """What each measure is taken from, by its name."""
+        each = self.measures.items()
+        return {name: Taken(of=of) if isinstance(of, str) else of for name, of in each}
+
+    @property
+    def columns(self) -> dict[str, str]:
+        """Column of the log by the name of each measure that is read from it."""
+        return {name: taken.of for name, taken in self.taken.items() if not taken.dump}
 
     @property
     def paths(self) -> dict[str, Path]:

@@ -221,7 +221,7 @@ def _is_beside_the_point(item: Any, key: str, findings: list[tuple[Any, Problem]
         # Entries that are wrong themselves are missing from pydantic's count.
         return bool(len(item["input"]) >= item["ctx"]["min_length"])
     # A union's other branch got further: into the value, or to a model's own rule (no url).
-    return item["type"] in ("tuple_type", "model_type", "literal_error") and any(
+    return item["type"] in ("tuple_type", "model_type", "string_type", "literal_error") and any(
         p.key.startswith(f"{key}.") or (p.key == key and "url" not in other)
         for other, p in findings
     )

@@ -8,7 +8,7 @@ from typing import Literal
 
 import numpy as np
 import pandas as pd
-from scipy.special import stdtr, stdtrit
+import scipy
 
 from sandmould.statistics.mean_tests import compare_means
 
@@ -81,7 +81,7 @@ def agree(first: pd.Series[float], second: pd.Series[float], margin: float) -> A
     verdict = classify_interval(ci, margin)
     if verdict != "not resolved":
         return Agreement(means, ci, margin, n, paired, verdict, "")
-    error = (ci[1] - ci[0]) / 2 / float(stdtrit(result.df, 0.5 + CONFIDENCE / 2))
+    error = (ci[1] - ci[0]) / 2 / float(scipy.special.stdtrit(result.df, 0.5 + CONFIDENCE / 2))
     more = _more(abs(difference), error * math.sqrt(n), margin, n, paired)
     note = (
         f"more than {MOST_REPLICATES} replicates would be needed: the difference lies about on "
@@ -121,10 +121,10 @@ def _more(size: float, spread: float, margin: float, n: int, paired: bool) -> in
     replicates = np.arange(n + 1, MOST_REPLICATES + 1)
     freedom = (replicates - 1) * (1 if paired else 2)
     error = spread / np.sqrt(replicates)
-    need = stdtrit(freedom, 0.5 + CONFIDENCE / 2)
-    chance = stdtr(freedom, (size - margin) / error - need)
+    need = scipy.special.stdtrit(freedom, 0.5 + CONFIDENCE / 2)
+    chance = scipy.special.stdtr(freedom, (size - margin) / error - need)
     if size < margin:
-        inside = stdtr(freedom, (margin - size) / error - need)
-        chance = inside + stdtr(freedom, (margin + size) / error - need) - 1
+        inside = scipy.special.stdtr(freedom, (margin - size) / error - need)
+        chance = inside + scipy.special.stdtr(freedom, (margin + size) / error - need) - 1
     enough = np.flatnonzero(chance >= POWER)
     return int(replicates[enough[0]]) - n if len(enough) else None

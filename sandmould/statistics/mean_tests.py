@@ -8,7 +8,7 @@ from functools import cache
 
 import numpy as np
 import pandas as pd
-from scipy.special import stdtr, stdtrit
+import scipy
 
 CONFIDENCE = 0.95
 
@@ -37,14 +37,14 @@ class MeanTest:
         beyond = max(0.0, abs(self.difference) - self.loop_error) / self.error
         if self.means > 2:
             return _range_beyond(math.sqrt(2.0) * beyond, self.means, self.df)
-        return 2.0 * float(stdtr(self.df, -beyond))
+        return 2.0 * float(scipy.special.stdtr(self.df, -beyond))
 
     def confidence_interval(self, level: float) -> tuple[float, float]:
         """Interval of the difference."""
         if self.means > 2:
             reach = _range_reached(level, self.means, self.df) / math.sqrt(2.0)
         else:
-            reach = float(stdtrit(self.df, 0.5 + level / 2))
+            reach = float(scipy.special.stdtrit(self.df, 0.5 + level / 2))
         half = reach * self.error + self.loop_error
         return self.difference - half, self.difference + half
 

@@ -8,7 +8,7 @@ from dataclasses import dataclass
 from typing import Literal
 
 import pandas as pd
-from scipy.special import stdtrit
+import scipy
 
 from sandmould.runs.columns import PART, RUN, SWEEP, finished
 from sandmould.runs.formatting import listed, number
@@ -135,7 +135,7 @@ def assess_robustness(
         ci, verdict = (math.nan, math.nan), _without_interval(shift)
         if math.isfinite(shift) and freedom:
             error = sd * math.sqrt(sum(1.0 / count[end] for end in ends))
-            reach = float(stdtrit(freedom, 0.5 + CONFIDENCE / 2)) * error
+            reach = float(scipy.special.stdtrit(freedom, 0.5 + CONFIDENCE / 2)) * error
             ci = (shift - reach, shift + reach)
             verdict = _of_interval(ci, margin)
         means = tuple(sign * mean.get((part, f), math.nan) for f in certified_hz)

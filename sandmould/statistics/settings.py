@@ -9,8 +9,8 @@ from typing import Any
 
 import numpy as np
 import pandas as pd
+import scipy
 from numpy.typing import NDArray
-from scipy.special import stdtrit
 
 from sandmould.runs.columns import REPLICATE, SEED
 from sandmould.runs.formatting import setting_text
@@ -98,7 +98,11 @@ def setting_of(
     """Mean, spread and interval of one setting's finished values."""
     n = len(measured)
     sd = float(measured.std(ddof=1)) if n > 1 else math.nan
-    half = float(stdtrit(n - 1, 0.5 + CONFIDENCE / 2)) * sd / math.sqrt(n) if n > 1 else sd
+    half = (
+        float(scipy.special.stdtrit(n - 1, 0.5 + CONFIDENCE / 2)) * sd / math.sqrt(n)
+        if n > 1
+        else sd
+    )
     mean = float(measured.mean()) if n else math.nan
     return Setting(
         values, setting_text(values), planned, n, mean, sd, half + loop_error, loop_error

@@ -14,8 +14,8 @@ from typing import Literal
 
 import numpy as np
 import pandas as pd
+import scipy
 from numpy.typing import NDArray
-from scipy.special import stdtrit
 
 from sandmould.runs.columns import PART, SWEEP
 from sandmould.runs.formatting import listed, number
@@ -235,7 +235,7 @@ def find_limbs(hz: Array, block: NDArray[np.intp], value: Array) -> CurveLimbs:
     last = len(distinct) - 1
     contrasts = Contrasts(place, np.unique(block, return_inverse=True)[1], value)
     level = 1.0 - (1.0 - CONFIDENCE) / last
-    t = float(stdtrit(contrasts.df, level)) if contrasts.df > 0 else math.nan
+    t = float(scipy.special.stdtrit(contrasts.df, level)) if contrasts.df > 0 else math.nan
     drop, error = np.full((2, last + 1), math.nan), np.full((2, last + 1), math.nan)
     for j in range(last + 1):
         for side, end in enumerate((0, last)):

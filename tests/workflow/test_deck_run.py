@@ -7,17 +7,24 @@ import signal
 import subprocess
 import sys
 import time
+import zipfile
 from pathlib import Path
 from typing import Any
 
 import pandas as pd
+import pytest
 import yaml
 
+from sandmould.execution.packs.pack import pack
+from sandmould.execution.packs.unpack import unpack
 from sandmould.execution.simulate import measure_run, render_run, simulate
 from sandmould.runs.outcome import Outcome, RunOutcome
 from sandmould.runs.run_tables import read_costs
+from sandmould.study.plan.build_plan import open_plan
 from sandmould.study.plan.expand import expand
 from sandmould.study.plan.load_study import open_study
+from sandmould.study.plan.plan_files import write_study
+from sandmould.study.plan.trust import reading_help
 from tests.planned import write_plan
 
 FALLING = """\
@@ -161,6 +168,77 @@ def test_a_deck_runs_on_liggghts(tmp_path: Path) -> None:
     assert abs(height_m.iloc[-1] - (0.01 - 9.81 * time_s**2 / 2)) < 1e-8
 
 
+TWO_FALL = """\
+units si
+atom_style sphere
+boundary p p f
+region box block 0 1 0 1 -9 1
+create_box 1 box
+create_atoms 1 single 0.5 0.5 0.5
+create_atoms 1 single 0.5 0.5 0.75
+set group all diameter 0.1
+set group all density 1000
+pair_style none
+comm_modify cutoff 0.2
+fix gravity all gravity 10 vector 0 0 -1
+fix motion all nve/sphere
+timestep 1e-3
+variable speed equal vcm(all,z)
+thermo_style custom step time v_speed
+thermo_modify format float %20.12g
+thermo 10
+dump grains all custom 25 grains.dump id z
+run 100
+"""
+
+
+def test_measures_of_a_fall_are_those_worked_out_by_hand(tmp_path: Path) -> None:
+    rate = {"of": "v_speed", "take": "rate"}
+    top = {"of": "z", "dump": "grains.dump", "grains": "max"}
+    worked_out = {
+        "speed_m_s": ("v_speed", -1.0),
+        # speed falls on a line: its mean is that of the ends of the window
+        "late_m_s": ({"of": "v_speed", "take": "mean", "over_last_s": 0.05}, -0.75),
+        "mean_m_s": ({"of": "v_speed", "take": "mean"}, -0.5),
+        "rate_m_s2": ({**rate, "from_s": 0.02}, -10.0),
+        "last_m": ({**top, "take": "last"}, 0.75 - 0.05),
+        "low_m": ({**top, "grains": "min"}, 0.5 - 0.05),
+        "both_m": ({**top, "grains": "sum"}, 1.25 - 0.1),
+        "middle_m": ({**top, "grains": "mean"}, 0.625 - 0.05),
+        # from 0.75 - 10 t²/2 at 0.05 s to the same at 0.1 s
+        "sinks_m_s": ({**top, "take": "rate", "over_last_s": 0.05}, -(0.05 - 0.0125) / 0.05),
+        # three moments, 25 steps apart: 0.05, 0.075 and 0.1 s
+        "mean_top_m": (
+            {**top, "take": "mean", "over_last_s": 0.05},
+            0.75 - (0.0125 / 2 + 0.028125 + 0.05 / 2) / 2,
+        ),
+    }
+    measures = {name: of for name, (of, _) in worked_out.items()}
+    folder = planned(tmp_path, TWO_FALL, measures=measures)
+    assert simulate(folder) == 0
+    series = pd.read_csv(folder / "series.tsv", sep="\t")
+    exact = {name: value for name, (_, value) in worked_out.items()}
+    # a dump of LAMMPS has six digits
+    assert series.iloc[-1][list(exact)].to_dict() == pytest.approx(exact, abs=1e-5)
+    assert series["rate_m_s2"].isna().sum() == 2  # before 0.02 s
+
+
+@pytest.mark.parametrize(
+    ("of", "told"),
+    [
+        (
+            {"of": "vz", "dump": "grains.dump"},
+            "the deck wrote no grains.dump with vz (measures.top_m)",
+        ),
+        ({"of": "z", "dump": "other.dump"}, "the deck wrote no other.dump with z (measures.top_m)"),
+    ],
+)
+def test_a_dump_that_lacks_a_measure_is_told(tmp_path: Path, of: dict[str, str], told: str) -> None:
+    folder = planned(tmp_path, TWO_FALL, measures={"top_m": of})
+    assert simulate(folder) == 0
+    assert RunOutcome.read(folder / "outcome.json").detail == told
+
+
 def test_an_error_of_the_engine_is_quoted(tmp_path: Path) -> None:
     lammps = planned(tmp_path, "units si\nbogus {{ a }}\n", values={"a": 1})
     assert compute(lammps) == 0
@@ -176,6 +254,14 @@ def test_an_error_of_the_engine_is_quoted(tmp_path: Path) -> None:
     )
 
 
+def test_a_log_holds_what_the_engine_said_when_it_died(tmp_path: Path) -> None:
+    sphere = "particletemplate/sphere 12 atom_type 1 density constant 1 radius constant 1"
+    seeded = FALLING_IN_LIGGGHTS.replace("run 500", f"fix grains all {sphere}")
+    folder = planned(tmp_path, seeded, engine={"name": "liggghts"}, values={"density_kg_m3": 2400})
+    assert compute(folder) == 0
+    assert "a prime number" in (folder / "last_work" / "engine_1.log").read_text()
+
+
 def test_a_measure_that_the_log_lacks_is_told(tmp_path: Path) -> None:
     few = {**LAMMPS, "values": {"gravity_m_s2": 9.81, "number": 1000}}
     # Behind such a command the text of a deck does not show all that it prints.
@@ -188,36 +274,33 @@ def test_a_measure_that_the_log_lacks_is_told(tmp_path: Path) -> None:
     measure_run(folder)  # what there is
 
 
-def test_a_column_that_one_run_lacks_stops_the_others_before_they_compute(tmp_path: Path) -> None:
-    hidden = FALLING.replace("thermo 1000", 'if "1 > 0" then "thermo 1000"')
-    (tmp_path / "deck.in.j2").write_text(hidden)
-
-    def study(column: str) -> list[Path]:
-        scenario = {"template": "deck.in.j2", "values": {"gravity_m_s2": 9.81, "number": 1000}}
-        told = {
-            "kind": "deck", "scenario": {**scenario, "measures": {"speed_m_s": column}},
-            "replicates": 2, "objective": {"measure": "speed_m_s"},
-        }  # fmt: skip
-        (tmp_path / "trial.yaml").write_text(yaml.safe_dump(told))
-        runs = expand(open_study(tmp_path / "trial.yaml"))
-        write_plan(runs, tmp_path / "results")
-        folders = [tmp_path / "results" / "runs" / run.run for run in runs]
-        for folder in folders:
-            render_run(folder)
-            assert simulate(folder) == 0
-        return folders
-
-    first, other = study("v_speed")
-    lacks = "the deck's log lacks the column v_speed (measures.speed_m_s): it has Step, Time, v_h"
-    assert RunOutcome.read(first / "outcome.json").detail.startswith(lacks)
-    outcome = RunOutcome.read(other / "outcome.json")
-    assert outcome.outcome is Outcome.BAD_INPUT
-    assert outcome.detail.startswith(f"not computed, since {first.name} has shown that {lacks}")
-    assert not list(other.glob("**/engine*.log"))
-    measure_run(other)  # nothing, and no fault
-    # Asked for what the deck prints, all are computed.
-    for folder in study("v_height"):
-        assert RunOutcome.read(folder / "outcome.json").outcome is Outcome.FINISHED
+def test_a_file_from_outside_is_listed_and_stays_out_of_packs(tmp_path: Path) -> None:
+    (tmp_path / "away").mkdir()
+    (tmp_path / "away" / "grains.data").write_text("of others")
+    scenario = {"template": "deck.in.j2", "files": ["../away/grains.data"]}
+    (tmp_path / "here").mkdir()
+    (tmp_path / "here" / "deck.in.j2").write_text("units si\n")
+    path, results = tmp_path / "here" / "trial.yaml", tmp_path / "results"
+    told = {"kind": "deck", "allowed_folders": ["../away"], "scenario": scenario}
+    path.write_text(yaml.safe_dump(told))
+    plan = open_plan(path, results)
+    listed = "../away/grains.data (from outside the study's folder, taken into results)"
+    assert listed in reading_help(plan.study, plan.runs)
+    write_plan(plan.runs, results / "trial")
+    write_study(plan.study.study, results / "trial")
+    (folder,) = (results / "trial" / run.place for run in plan.runs)
+    render_run(folder)
+    assert simulate(folder) == 0
+    measure_run(folder)
+    copy = f"trial/runs/{folder.name}/output/grains.data"
+    for asked in (False, True):
+        said = pack(plan, results, tmp_path / "runs.zip", outside_files=asked)
+        assert ("../away/grains.data" in said) is not asked
+        with zipfile.ZipFile(tmp_path / "runs.zip") as packed:
+            assert (copy in packed.namelist()) is asked
+    pack(plan, results, tmp_path / "runs.zip")
+    unpack(tmp_path / "runs.zip", tmp_path / "elsewhere")
+    assert open_plan(path, tmp_path / "elsewhere").lacks(tmp_path / "elsewhere") == {}
 
 
 def test_a_misspelt_style_is_no_missing_engine(tmp_path: Path) -> None:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import os
 import tempfile
+from collections.abc import Container
 from pathlib import Path
 
 from sandmould.bad_input import BadInputError, Problem
@@ -11,7 +12,7 @@ from sandmould.definition.run import FILLS
 from sandmould.digest import file_digest
 from sandmould.engines.snapshot_file import OLDER, SNAPSHOTS, SnapshotFile, stored_snapshots
 from sandmould.execution.packs.archive import AT_END, SUFFIX, place_of, reasons_lines, write_pack
-from sandmould.runs.formatting import size_text
+from sandmould.runs.formatting import listed, size_text
 from sandmould.runs.manifest import (
     HASHES,
     LEFT_OUT,
@@ -22,17 +23,25 @@ from sandmould.runs.manifest import (
     save_manifest,
 )
 from sandmould.study.plan.build_plan import Plan, writing
+from sandmould.study.plan.trust import carried
 from sandmould.study.rounds.round_log import ROUNDS_FILE
 
 _EARLIER = (SNAPSHOTS, f"{OLDER}/", "exports")
 """How the names of files begin that show how a run came to its end."""
 
 
-def pack(plan: Plan, results: Path, target: Path | None = None, *, last_state: bool = False) -> str:
+def pack(
+    plan: Plan,
+    results: Path,
+    target: Path | None = None,
+    *,
+    last_state: bool = False,
+    outside_files: bool = False,
+) -> str:
     """Pack a study, without snapshots before the last and exports for its ``last_state`` alone.
 
     Films and pictures of earlier moments are not to be had from such runs any more, their tables
-    are.
+    are. Copies of files from outside the study's folder go along if ``outside_files`` asks so.
 
     Returns
     -------
@@ -52,6 +61,7 @@ def pack(plan: Plan, results: Path, target: Path | None = None, *, last_state: b
     lacks = plan.lacks(results)
     left_out = {run: lack.why or "not at its end" for run, lack in lacks.items()}
     files: dict[str, Path] = {}
+    beyond: dict[str, str] = {}
     with (
         writing(target.parent, "--output"),
         tempfile.TemporaryDirectory(prefix=f"{study}.partial", dir=target.parent) as work,
@@ -60,7 +70,9 @@ def pack(plan: Plan, results: Path, target: Path | None = None, *, last_state: b
             if run.run in left_out:
                 continue
             try:
-                found = _files_of(folder / run.place, Path(work, run.run) if last_state else None)
+                others = {} if outside_files else carried(plan.study, run.scenario)
+                found = _files_of(folder / run.place, Path(work, run.run), last_state, others)
+                beyond |= {n: p for n, p in others.items() if (folder / run.place / n).is_file()}
             except ValueError as error:
                 left_out[run.run] = str(error)
                 continue
@@ -75,11 +87,14 @@ def pack(plan: Plan, results: Path, target: Path | None = None, *, last_state: b
         os.replace(write_pack(study, there, Path(work)), target)
     of_study = {run.run: left_out[run.run] for run in plan.runs if run.run in left_out}
     number, size = len(plan.runs) - len(of_study), size_text(target.stat().st_size)
-    return "\n".join([f"{target}: {number} runs, {size}", *reasons_lines(of_study, "left out")])
+    lines = [f"{target}: {number} runs, {size}", *reasons_lines(of_study, "left out")]
+    if beyond:
+        lines.append(f"left out, from outside the study's folder: {listed([*beyond.values()])}")
+    return "\n".join(lines)
 
 
-def _files_of(place: Path, anew: Path | None) -> dict[str, Path]:
-    """Files of a run at its end, in its last state alone where a folder takes what is new.
+def _files_of(place: Path, anew: Path, last_state: bool, others: Container[str]) -> dict[str, Path]:
+    """Files of a run at its end without others; what is new for its last state goes into ``anew``.
 
     Raises
     ------
@@ -91,14 +106,18 @@ def _files_of(place: Path, anew: Path | None) -> dict[str, Path]:
         raise ValueError("of an older version, without a list of its files")
     if why := change(place, manifest):
         raise ValueError(why)
-    if anew is not None:
-        anew.mkdir()
+    anew.mkdir()
+    if last_state:
         manifest = _last_state(place, manifest, anew)
+    if left := [name for name in manifest["computed"] if name in others]:
+        sizes = {name: size for name, size in manifest["computed"].items() if name not in left}
+        manifest = manifest | {"computed": sizes}
+        save_manifest(anew, manifest)
     names = (*AT_END, *listed_files(manifest))
     if odd := [name for name in names if not place_of(f"runs/{place.name}/{name}")]:
         raise ValueError(f"with a file that cannot be packed, {odd[0]!r}")
     now = {name: place / name for name in names}
-    return now | {path.name: path for path in (anew.iterdir() if anew else ())}
+    return now | {path.name: path for path in anew.iterdir()}
 
 
 def _last_state(place: Path, manifest: Manifest, anew: Path) -> Manifest:

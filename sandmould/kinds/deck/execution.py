@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from importlib import import_module
 from pathlib import Path
 
 from sandmould.definition.run import Run
@@ -18,7 +19,7 @@ from sandmould.scenario.own_deck import OwnDeck
 class DeckExecution(Execution[OwnDeck]):
     """See ``Execution``."""
 
-    products = ("series.tsv", computation.OUTPUT)
+    products = ("series.tsv", own_deck.OUTPUT)
 
     def render(self, run: Run, folder: Path) -> None:
         """Write the deck as the engine reads it at the beginning."""
@@ -37,6 +38,10 @@ class DeckExecution(Execution[OwnDeck]):
     def no_cost(self, scenario: OwnDeck) -> Cost:
         """Cost before the engine has started."""
         return Cost(scenario.engine.name, scenario.engine.ranks, math.nan, math.nan)
+
+    def load_measuring(self, scenario: OwnDeck) -> None:
+        """Import what draws."""
+        import_module("matplotlib.figure")
 
     def measure(self, run: Run, folder: Path) -> None:
         """Write the measures against time, and draw them."""

@@ -21,6 +21,7 @@ class DeckProgram(UserProgram[OwnDeck]):
     """See ``UserProgram``."""
 
     shipped = DECKS
+    copied = own_deck.OUTPUT
 
     def files(self, scenario: OwnDeck) -> Mapping[str, Path]:
         """Template and files by key."""
@@ -62,7 +63,7 @@ class DeckPlanning(Planning[OwnDeck]):
         MeasureGroup(
             "as scenario.measures names them",
             lambda scenario: scenario.measures,
-            (Measure("<measure>", "Column of the engine's log that scenario.measures gives it."),),
+            (Measure("<measure>", "What scenario.measures takes of the log or of a dump."),),
         ),
     )
     measuring = ("sandmould/kinds/deck/measure.py",)

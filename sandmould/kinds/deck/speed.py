@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import contextlib
 import json
 import math
 import shutil
@@ -10,17 +11,25 @@ import sys
 import tempfile
 import textwrap
 import time
+from collections.abc import Sequence
 from pathlib import Path
+
+import numpy as np
+import pandas as pd
 
 from sandmould.bad_input import BadInputError, Problem, display_path
 from sandmould.digest import SHORT, digest
 from sandmould.engines.registry import engine_module
 from sandmould.kinds.deck.own import computation
 from sandmould.kinds.deck.own import deck as own_deck
+from sandmould.kinds.deck.own.columns import missing_columns
+from sandmould.kinds.deck.own.thermo import STEP
 from sandmould.kinds.stored_speed import StoredSpeed
 from sandmould.module_main import run_main
 from sandmould.runs.files import write_text
+from sandmould.runs.formatting import display_number, name_of
 from sandmould.runs.parent import end_with_parent
+from sandmould.runs.words import say
 from sandmould.scenario.own_deck import OwnDeck
 
 FAILED_LOG = "pilot_failed.log"
@@ -28,6 +37,10 @@ FAILED_LOG = "pilot_failed.log"
 PILOT_S = 12.0
 """A shorter run is computed whole; of a longer one its steps are counted."""
 _LOOK_EVERY_S = 0.2
+MOST_OFF = 1e-3
+"""Share of a measure that a restart may change before it is said."""
+ROUND_OFF = 1e-9
+"""Share of a measure's largest value below which it is as good as nothing."""
 
 
 class DeckSpeed(StoredSpeed[OwnDeck]):
@@ -38,20 +51,39 @@ class DeckSpeed(StoredSpeed[OwnDeck]):
     def computed_by(self, scenario: OwnDeck) -> str:
         """Engine and deck: a deck with other values is one of another price."""
         version = engine_module(scenario.engine.name).installed_version()
-        deck = digest(own_deck.render(scenario.model_copy(update={"seed": 1}), "pilot", "pilot"))
+        seeded = scenario.model_copy(update={"seed": 1})
+        starts = ("", own_deck.RESTART_FILES[0])
+        decks = [own_deck.render(seeded, "pilot", "pilot", start) for start in starts]
+        deck = digest(*decks, *sorted(f"{name} {of}" for name, of in scenario.measures.items()))
         return f"{scenario.engine.name} {version} {deck[:SHORT]}"
 
     def trial(self, scenario: OwnDeck, results: Path) -> float | None:
-        """Processor time of a whole run, by a pilot."""
-        return pilot(scenario, results)
+        """Processor time of a whole run, by a pilot; what else it has shown is kept beside it."""
+        core_s, said = pilot(scenario, results)
+        kept = self._said(scenario)
+        with contextlib.suppress(OSError):
+            kept.parent.mkdir(parents=True, exist_ok=True)
+            kept.write_text(said, encoding="utf-8")
+        return core_s
+
+    def measured(self, scenario: OwnDeck, results: Path) -> float | None:
+        """The same as of any speed; what a pilot has shown is said at each start."""
+        rate = super().measured(scenario, results)
+        with contextlib.suppress(OSError):
+            if said := self._said(scenario).read_text(encoding="utf-8"):
+                say(said)
+        return rate
+
+    def _said(self, scenario: OwnDeck) -> Path:
+        return self.file(scenario).with_suffix(".said")
 
     def rate(self, scenario: OwnDeck, stored: float) -> float:
         """Expected core-seconds that a second of a core computes."""
         return scenario.expected_core_s / stored
 
 
-def pilot(scenario: OwnDeck, results: Path, pilot_s: float = PILOT_S) -> float | None:
-    """Compute the deck for some seconds in a folder of its own; processor time of a whole run.
+def pilot(scenario: OwnDeck, results: Path, pilot_s: float = PILOT_S) -> tuple[float | None, str]:
+    """Compute the deck for some seconds in a folder of its own, in one piece and gone on with.
 
     Parameters
     ----------
@@ -64,7 +96,10 @@ def pilot(scenario: OwnDeck, results: Path, pilot_s: float = PILOT_S) -> float |
     Returns
     -------
     float or None
-        None where the deck states no ``steps`` and did not end in time.
+        Processor time of a whole run; None where the deck states no ``steps`` and did not end in
+        time.
+    str
+        What else it has shown: sentences on lines, or nothing.
 
     Raises
     ------
@@ -72,24 +107,84 @@ def pilot(scenario: OwnDeck, results: Path, pilot_s: float = PILOT_S) -> float |
         With what the engine said, where the deck stopped with an error.
     """
     if scenario.engine.ranks > 1:
-        return None
+        return None, ""
     with tempfile.TemporaryDirectory() as name:
         folder = Path(name) / "runs" / "pilot"
         folder.mkdir(parents=True)
         write_text(folder / "scenario.json", scenario.model_dump_json())
-        with (folder / "log").open("w") as log:
-            process = subprocess.Popen(
-                [sys.executable, "-m", __name__, str(folder)],
-                stdin=subprocess.DEVNULL, stdout=log, stderr=log, preexec_fn=end_with_parent,
-            )  # fmt: skip
-        try:
-            core_s = _watched(process, folder, pilot_s)
-            if process.returncode is not None and not (folder / "whole.json").exists():
-                raise BadInputError([_failure(scenario, folder, process.returncode, results)])
-            return core_s
-        finally:
-            process.kill()
-            process.wait()
+        core_s, status = _computed(folder, pilot_s)
+        if status is not None and not (folder / "whole.json").exists():
+            raise BadInputError([_failure(scenario, folder, status, results)])
+        whole = computation.series(scenario, folder / "work")
+        shown = (_lacks(scenario, whole), _resumed(scenario, whole, folder, pilot_s))
+        return core_s, "\n".join(f"{_of_values(scenario)}: {said}." for said in shown if said)
+
+
+def _computed(folder: Path, pilot_s: float) -> tuple[float | None, int | None]:
+    """Processor time of a whole run, and the status with which the pilot ended, if it did."""
+    with (folder / "log").open("w") as log:
+        process = subprocess.Popen(
+            [sys.executable, "-m", __name__, str(folder)],
+            stdin=subprocess.DEVNULL, stdout=log, stderr=log, preexec_fn=end_with_parent,
+        )  # fmt: skip
+    try:
+        return _watched(process, folder, pilot_s), process.returncode
+    finally:
+        process.kill()
+        process.wait()
+
+
+def _lacks(scenario: OwnDeck, series: pd.DataFrame) -> str:
+    """Say which columns the log of a pilot has not printed yet."""
+    logged = [str(name).removeprefix(computation.LOGGED) for name in series]
+    missing = missing_columns(scenario, logged) if len(series) else ""
+    return f"in its first seconds {missing.rstrip('.')}" if missing else ""
+
+
+def _resumed(scenario: OwnDeck, whole: pd.DataFrame, folder: Path, pilot_s: float) -> str:
+    """Have the deck go on from the older of its restart files, and say what that changes."""
+    work, why = folder / "work", folder / "why.txt"
+    if not (files := computation.restarts(scenario, work)):
+        return ""
+    for newer in files[:-1]:
+        newer.unlink()
+    for left in (folder / "begun", folder / "whole.json", why):
+        left.unlink(missing_ok=True)
+    _computed(folder, pilot_s)
+    said = why.read_text(encoding="utf-8") if why.exists() else computation.WENT_ON
+    if not said.startswith(computation.WENT_ON):
+        return f"a run that is killed does not go on as it should. {said}"
+    return difference(whole, computation.series(scenario, work), list(scenario.measures))
+
+
+def difference(whole: pd.DataFrame, resumed: pd.DataFrame, measures: Sequence[str]) -> str:
+    """Say which measures a restart changes, at the last step of both series, or nothing."""
+    step = computation.LOGGED + STEP
+    names = [name for name in measures if name in whole]
+    one, other = (
+        table.drop_duplicates(step, keep="last").set_index(step)[names]
+        for table in (whole, resumed)
+    )
+    gap = (other - one).dropna(how="all").abs()
+    parted = gap[(gap > 0).any(axis=1)]
+    if parted.empty:
+        return ""
+    last, largest = gap.index[-1], one.abs().max()
+    off = gap.loc[last] > np.maximum(MOST_OFF * one.loc[last].abs(), ROUND_OFF * largest)
+    told = [
+        f"{name_of(n)} {display_number(n, now, 4)} instead of {display_number(n, before, 4)}"
+        for n, now, before in zip(names, other.loc[last], one.loc[last], strict=True)
+        if off[n]
+    ]
+    if not told:
+        return ""
+    grew = "they part slowly, as colliding grains make much of the last digit"
+    if (parted.iloc[0] > MOST_OFF * largest).any():
+        grew = "they part at once, so the deck does not bring back all that it needs"
+    return (
+        "gone on from a restart file, it comes to other values than in one piece: at step "
+        f"{last:.0f} {', '.join(told)}; {grew}"
+    )
 
 
 def _failure(scenario: OwnDeck, folder: Path, status: int, results: Path) -> Problem:
@@ -100,12 +195,17 @@ def _failure(scenario: OwnDeck, folder: Path, status: int, results: Path) -> Pro
     kept = results / FAILED_LOG
     results.mkdir(parents=True, exist_ok=True)
     shutil.copy(logs[0], kept)
-    values = textwrap.shorten(json.dumps(scenario.values, ensure_ascii=False), 120)
     return Problem(
         "scenario.template", scenario.template, "a deck that runs",
-        sentence=f"{Path(scenario.template).name} with the values {values} stopped in a short "
-        f"pilot run. {said.rstrip('. ')}. Its log: {display_path(kept)}",
+        sentence=f"{_of_values(scenario)} stopped in a short pilot run. {said.rstrip('. ')}. Its "
+        f"log: {display_path(kept)}",
     )  # fmt: skip
+
+
+def _of_values(scenario: OwnDeck) -> str:
+    """Name the deck of a pilot."""
+    values = textwrap.shorten(json.dumps(scenario.values, ensure_ascii=False), 120)
+    return f"{Path(scenario.template).name} with the values {values}"
 
 
 def _watched(process: subprocess.Popen[bytes], folder: Path, pilot_s: float) -> float | None:
@@ -134,10 +234,10 @@ def main(name: str) -> int:
     scenario = OwnDeck.model_validate_json((folder / "scenario.json").read_text())
     write_text(folder / "begun", "")
     computed = computation.compute(scenario, folder, "pilot", "pilot")
-    if computed.outcome.outcome == 0:
+    outcome = computed.outcome
+    write_text(folder / "why.txt", outcome.detail or outcome.outcome.label)
+    if outcome.outcome == 0:
         write_text(folder / "whole.json", json.dumps(computed.cost.cpu_s))
-    else:
-        write_text(folder / "why.txt", computed.outcome.detail or computed.outcome.outcome.label)
     return 0
 
 

@@ -2,10 +2,12 @@
 
 from __future__ import annotations
 
+from sandmould.kinds.deck.own.computation import WENT_ON
 from sandmould.report.kinds.kind import Findings, KindPages, KindReport
 from sandmould.report.method import deck_method
 from sandmould.report.sureness import scatter_ground
 from sandmould.report.time_series import curve_figures, measure_curves, whole_conclusion
+from sandmould.runs.columns import DETAIL
 from sandmould.scenario.own_deck import OwnDeck
 from sandmould.study.collect import Collected
 
@@ -13,8 +15,11 @@ from sandmould.study.collect import Collected
 def _notes(
     scenario: OwnDeck, collected: Collected, seeks_best: bool, is_controlled: bool
 ) -> tuple[str, ...]:
-    """Whose deck it is."""
-    return ("The deck is the user's own: what it simulates, and how well, it alone says.",)
+    """Whose deck it is, and how many runs were killed and went on."""
+    said = "The deck is the user's own: what it simulates, and how well, it alone says."
+    went_on = int(collected.summary[DETAIL].astype(str).str.contains(WENT_ON).sum())
+    resumed = f"Runs gone on with from a restart file after a kill: {went_on}."
+    return (said, resumed) if went_on else (said,)
 
 
 def _pages(findings: Findings[OwnDeck], film_budget_bytes: int) -> KindPages:

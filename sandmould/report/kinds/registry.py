@@ -2,20 +2,22 @@
 
 from __future__ import annotations
 
+from importlib import import_module
+from typing import cast
+
 from sandmould.kinds.kind import AnyScenario
 from sandmould.kinds.registry import kind_of
-from sandmould.report.kinds import deck, flow, sand, solidification
 from sandmould.report.kinds.kind import KindReport
 
-REPORTS: dict[str, KindReport] = {
-    "sand": sand.REPORT,
-    "deck": deck.REPORT,
-    "solidification": solidification.REPORT,
-    "flow": flow.REPORT,
+REPORTS = {
+    "sand": "sandmould.report.kinds.sand",
+    "deck": "sandmould.report.kinds.deck",
+    "solidification": "sandmould.report.kinds.solidification",
+    "flow": "sandmould.report.kinds.flow",
 }
-"""The part of a report by the name of its kind."""
+"""The module that holds the part of a report by the name of its kind, imported when asked for."""
 
 
 def report_of(scenario: AnyScenario) -> KindReport:
     """The part of a report that depends on the kind of a scenario."""
-    return REPORTS[kind_of(scenario).name]
+    return cast(KindReport, import_module(REPORTS[kind_of(scenario).name]).REPORT)

@@ -88,7 +88,7 @@ def expand(
     added += [(point, seeds) for point in controlled.values()]
     for point, replicates in (*swept, *added):
         at_point = _AtPoint(study, base, point, labels, measured)
-        for problem in at_point.problems:
+        for problem in map(study.as_written, at_point.problems):
             problems[str(problem)] = problem
         if len(problems) >= MOST_PROBLEMS:
             break

@@ -6,7 +6,7 @@ import contextlib
 import difflib
 import os
 import re
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
 from pathlib import Path
@@ -58,6 +58,8 @@ class OpenStudy:
     """The merged files below the study, the scenario with all its defaults."""
     origin: Origin
     """File and source of each value, by key path from the study's root."""
+    written: Mapping[str, str]
+    """Names of files as the user wrote them, by those seen from ROOT."""
 
     @cached_property
     def scene_origin(self) -> Origin:
@@ -69,6 +71,11 @@ class OpenStudy:
         """Name of the study's file in messages."""
         return display_path(self.path)
 
+    def as_written(self, problem: Problem) -> Problem:
+        """A problem that shows a file's name as the user wrote it."""
+        name = problem.value if isinstance(problem.value, str) else ""
+        return replace(problem, value=self.written.get(name, problem.value))
+
 
 @dataclass(frozen=True)
 class StudyFile:
@@ -78,6 +85,7 @@ class StudyFile:
     name: str
     """In messages."""
     tree: Tree
+    written: dict[str, str]
 
 
 def open_study(path: Path, text: str | None = None) -> OpenStudy:
@@ -137,7 +145,8 @@ def study_of(files: Sequence[StudyFile]) -> OpenStudy:
     ]
     if problems:
         raise BadInputError([replace(p, file=origin.file_of(p.key)) for p in problems])
-    return OpenStudy(path.stem, path, study, tree, origin)
+    written = {seen: name for file in files for seen, name in file.written.items()}
+    return OpenStudy(path.stem, path, study, tree, origin, written)
 
 
 def _kind(files: Sequence[StudyFile]) -> Kind[Any]:
@@ -218,24 +227,33 @@ def materials(model: type[BaseModel]) -> list[str]:
 
 
 def _read(path: Path, text: str | None = None) -> StudyFile:
-    name = display_path(path)
-    return StudyFile(path, name, _from_root(read_yaml(path, name, text), path.parent))
+    name, written = display_path(path), dict[str, str]()
+    tree = _named_from_root(read_yaml(path, name, text), path.parent, written)
+    return StudyFile(path, name, tree, written)
 
 
-def _from_root(tree: Any, folder: Path, key: str = "") -> Any:
+def _named_from_root(tree: Any, folder: Path, written: dict[str, str], key: str = "") -> Any:
     """A file's tree with the files that it names as seen from itself named as seen from ROOT.
 
     So a run finds them from any working directory; what counts of them is name and content.
+    ``written`` keeps their names as they stand there.
     """
     if isinstance(tree, dict):
-        return {n: _from_root(v, folder, f"{key}.{n}") for n, v in tree.items()}
+        return {n: _named_from_root(v, folder, written, f"{key}.{n}") for n, v in tree.items()}
     if isinstance(tree, list):
         # the values of a swept key stand at the key, entries of other lists below it
-        swept = re.search(_FILE_KEY, key)
-        return [_from_root(v, folder, key if swept else f"{key}.{i}") for i, v in enumerate(tree)]
+        keys = [key if re.search(_FILE_KEY, key) else f"{key}.{i}" for i in range(len(tree))]
+        return [_named_from_root(v, folder, written, k) for v, k in zip(tree, keys, strict=True)]
     if isinstance(tree, str) and re.search(_FILE_KEY, key):
-        return Path(os.path.relpath(folder / tree, ROOT)).as_posix()
+        seen = from_root(folder / tree)
+        written[seen] = tree
+        return seen
     return tree
+
+
+def from_root(path: Path) -> str:
+    """Name of a file as seen from ROOT."""
+    return Path(os.path.relpath(path, ROOT)).as_posix()
 
 
 def _places(name: Any, folders: tuple[Path, ...]) -> list[Path]:

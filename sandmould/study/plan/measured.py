@@ -12,6 +12,7 @@ from sandmould.bad_input import Problem
 from sandmould.definition import own_measures
 from sandmould.definition.study import Study
 from sandmould.kinds.kind import AnyScenario, Kind
+from sandmould.runs.formatting import listed
 from sandmould.runs.measures import Measure, measures_of
 from sandmould.statistics.config import Objective
 
@@ -42,7 +43,9 @@ def problems(study: Study, kind: Kind[Any], scenario: AnyScenario) -> Iterator[P
     nothing_asked = not has and study.objective == Objective()
     for key, name in _asked(study):
         if name not in has and not nothing_asked:
-            yield Problem(key, name, _valid(name, has, _about(key, name, study, kind)))
+            is_stated = key != "objective.measure" or "measure" in study.objective.model_fields_set
+            said = "" if is_stated else _to_state(has)
+            yield Problem(key, name, _valid(name, has, _comes_with(name, kind)), sentence=said)
 
 
 def problems_elsewhere(study: Study, results: Path) -> Iterator[Problem]:
@@ -85,19 +88,20 @@ def _asked(study: Study) -> Iterator[tuple[str, str]]:
                 yield f"calibration.sands.{i}.targets", name
 
 
-def _about(key: str, name: str, study: Study, kind: Kind[Any]) -> str:
-    """Why a name is asked for, or why it is not there, in brackets; nothing where none tells."""
-    if key == "objective.measure" and "measure" not in study.objective.model_fields_set:
-        return f" (none is stated: {name} is the default)"
-    comes = _comes_with(name, kind)
-    return f" ({name}: {comes})" if comes else ""
+def _to_state(has: list[str]) -> str:
+    """Ask for an objective where none is stated."""
+    if not has:
+        return "an objective needs a measure, and this study has none"
+    example = f"objective: {{measure: {has[0]}}}"
+    return f"state an objective, such as {example}: this study measures {listed(has, most=8)}"
 
 
-def _valid(name: str, has: list[str], about: str) -> str:
+def _valid(name: str, has: list[str], comes: str) -> str:
     near = difflib.get_close_matches(name, has, n=NEAREST, cutoff=0.5)
     names = f"nearest are {', '.join(near)}" if len(near) > 1 else f"nearest is {''.join(near)}"
     if not near:
         names = f"such as {', '.join(has[:NEAREST])}" if has else "it has none"
+    about = f" ({name}: {comes})" if comes else ""
     return f"a measure that this scene will have{about}: {names}; sandmould measures lists all"
 
 

@@ -11,7 +11,7 @@ from sandmould.definition.run import Run
 from sandmould.kinds.kind import AnyScenario
 from sandmould.kinds.registry import kind_named
 from sandmould.runs.formatting import listed
-from sandmould.study.plan.load_study import OpenStudy
+from sandmould.study.plan.load_study import OpenStudy, from_root
 
 
 def outside(study: OpenStudy, scenario: AnyScenario) -> list[Problem]:
@@ -39,10 +39,26 @@ def outside(study: OpenStudy, scenario: AnyScenario) -> list[Problem]:
         "allowed_folders"
     )
     return [
-        Problem(f"scenario.{key}", display_path(path), valid)
+        study.as_written(Problem(f"scenario.{key}", from_root(path), valid))
         for key, path in program.files(scenario).items()
         if not any(path.resolve().is_relative_to(folder) for folder in allowed)
     ]
+
+
+def carried(study: OpenStudy, scenario: AnyScenario) -> dict[str, str]:
+    """Files from outside the study's folder that a run takes into its own: name there, name here.
+
+    Those that are shipped are left out; links are followed.
+    """
+    program = kind_named(study.study.kind).planning.program
+    if program is None:
+        return {}
+    known = [study.path.parent.resolve(), program.shipped.resolve()]
+    return {
+        f"{program.copied}/{path.name}": study.written.get(from_root(path), str(path))
+        for path in program.files(scenario).values()
+        if not any(path.resolve().is_relative_to(folder) for folder in known)
+    }
 
 
 def may_run(study: OpenStudy, runs: Sequence[Run]) -> bool:
@@ -114,12 +130,19 @@ def reading_help(study: OpenStudy, runs: Sequence[Run]) -> str:
     if program is None or not foreign:
         return ""
     points = {str(run.parameters): run.scenario for run in runs}
-    lines = program.to_read(list(points.values())) or ["none was found"]
+    beyond = {name for run in runs for name in carried(study, run.scenario).values()}
+    taken = [f"{name} (from outside the study's folder, taken into results)" for name in beyond]
+    lines = [*program.to_read(list(points.values())), *sorted(taken)] or ["none was found"]
     trusted = study.study.trusts_program
     return "\n".join(
         [
             f"This study runs a program: {listed(foreign)}. Lines to look at before you run it:",
             *(f"  {line}" for line in lines),
+            *(
+                [f"{taken}{listed(sorted(beyond), most=20)}. Packs leave them out."]
+                if beyond
+                else []
+            ),
             "The list helps to read it and protects from nothing (docs/trust.md).",
             f"{study.file} allows it to run (trust_deck: true)."
             if trusted

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import os
 import re
 from collections.abc import Iterator
@@ -112,6 +113,17 @@ def test_every_filter_works_where_no_file_can_be_opened() -> None:
                 assert "Errno" not in told, (name, value)
                 assert ".py" not in told, (name, value)
                 assert "ended" not in told, (name, value)
+
+
+def test_liggghts_takes_each_seed_as_a_prime() -> None:
+    seeds = [*range(300), 6_999_999, 2**31 - 1]
+    text = "{% for n in seeds %}{{ n | prime }} {% endfor %}"
+    primes = [int(word) for word in rendered(text, {"seeds": seeds}).split()]
+    assert len(set(primes)) == len(seeds)
+    assert primes[:2] == [10_007, 10_301]
+    for prime in primes:
+        assert 10_000 < prime < 2**31
+        assert all(prime % divisor for divisor in range(2, math.isqrt(prime) + 1))
 
 
 def test_a_forked_process_has_its_own() -> None:

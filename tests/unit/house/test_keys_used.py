@@ -14,6 +14,7 @@ from pydantic import BaseModel
 from sandmould import ROOT
 from sandmould.definition.sweep import Range, Sweep
 from sandmould.kinds.registry import KINDS
+from sandmould.scenario.own_deck import Taken
 from sandmould.scenario.quantity import PLANNED, Section, models_in, quantity
 from sandmould.scenario.yaml_text import load_users
 
@@ -34,6 +35,7 @@ PHYSICS = {
     "Loop.most_factor": "tests/wedge.py",
     "Loop.mass_scale": "tests/verification/test_coupling_monolithic.py",
     "Loop.damping_ratio": "tests/verification/test_coupling_monolithic.py",
+    **{f"Taken.{key}": "tests/workflow/test_deck_run.py" for key in Taken.model_fields},
     "PatternConfig.depth_m": "tests/unit/pattern_fe/test_pattern_scene.py",
 }
 """Keys that no shipped study sets, each with the test that knows the exact answer."""

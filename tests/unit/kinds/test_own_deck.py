@@ -78,11 +78,16 @@ def test_every_point_gets_its_deck(tmp_path: Path) -> None:
 @pytest.mark.parametrize(
     ("template", "scenario", "told"),
     [
-        (TEMPLATE, {"template": "other.in.j2"}, r"scenario.template = '.*other.in.j2' .* can be r"),
-        (TEMPLATE, {"files": ["grains.data"]}, r"scenario.files = '.*grains.data' .* can be read"),
+        (TEMPLATE, {"template": "other.in.j2"}, r"scenario.template = 'other.in.j2' .* can be r"),
+        (TEMPLATE, {"files": ["grains.data"]}, r"scenario.files = 'grains.data' .* can be read"),
         (TEMPLATE + "{{ friction }}", {}, r"'friction' is undefined\); it is given angle_deg, n"),
         ("{% if %}", {}, r"template that renders \(line 1: "),
         (TEMPLATE + "{% include 'other' %}", {}, "no loader"),
+        (
+            "{{ seed | first_prime }}",
+            {},
+            r"\(line 1: No filter named 'first_prime'\.\); it is given",
+        ),
         (
             TEMPLATE,
             {"values": {"angle_deg": 20, "number": 1, "anlge": 3}},
@@ -111,6 +116,36 @@ def test_what_cannot_run_is_told_in_one_sentence(
         (tmp_path / "sub" / "chute.in.j2").touch()
     with pytest.raises(BadInputError, match=told):
         expand(open_study(opened(tmp_path, template, **scenario)))
+
+
+@pytest.mark.parametrize(
+    ("of", "told"),
+    [
+        ({"take": "mean"}, ".of = None cannot be used: valid is a value"),
+        ({"of": "KinEng", "take": "median"}, ".take = 'median' .* one of 'last', 'mean' or 'rate'"),
+        (
+            {"of": "KinEng", "from_s": 1},
+            "valid is take: mean or take: rate with one of over_last_s",
+        ),
+        ({"of": "y", "dump": "../a.dump"}, r".dump = '../a.dump' cannot be used"),
+        (3, "speed_m_s = 3 cannot be used: valid is text or a mapping of keys to values"),
+    ],
+)
+def test_what_no_measure_is_taken_from_is_told(tmp_path: Path, of: Any, told: str) -> None:
+    with pytest.raises(BadInputError, match=told) as error:
+        open_study(opened(tmp_path, measures={"speed_m_s": of}))
+    assert len(error.value.problems) == 1
+
+
+def test_a_deck_without_objective_is_asked_for_one(tmp_path: Path) -> None:
+    path = opened(tmp_path, measures={"speed_m_s": "v_speed", "height_m": "v_height"})
+    path.write_text(yaml.safe_dump(yaml.safe_load(path.read_text()) | {"objective": {}}))
+    with pytest.raises(BadInputError) as told:
+        expand(open_study(path))
+    assert str(told.value) == (
+        f"{path}: state an objective, such as objective: {{measure: height_m}}: this study "
+        "measures height_m and speed_m_s."
+    )
 
 
 PRINTS = TEMPLATE + "thermo_style custom step time v_speed &\n  v_height # v_width\n"
@@ -245,7 +280,8 @@ def test_runs_are_collected_and_reported(tmp_path: Path) -> None:
             of_run / "series.tsv", sep="\t", index=False
         )
         (of_run / "outcome.json").write_text(
-            '{"code": 0, "detail": "", "simulated_s": 1.0, "planned_s": 0.0}'
+            '{"code": 0, "detail": "gone on from restart.a at step 5", "simulated_s": 1.0, '
+            '"planned_s": 0.0}'
         )
         (of_run / "cost.tsv").write_text("engine\tversion\tranks\tcpu_s\nlammps\t1\t1\t9\n")
         DECK.execution.measure(run, of_run)
@@ -257,6 +293,7 @@ def test_runs_are_collected_and_reported(tmp_path: Path) -> None:
     page = (folder / "report.html").read_text()
     assert "Use 20 °: there the speed is highest." in page
     assert "speed from v_speed" in page
+    assert "Runs gone on with from a restart file after a kill: 4." in page
     assert (folder / "figures" / "curves.svg").exists()
     assert "vibration" not in page.split("<style>")[0] + page.split("</style>")[1]
 
@@ -293,7 +330,8 @@ def test_a_deck_that_goes_on_too_far_has_failed(tmp_path: Path) -> None:
         else:
             assert ended.outcome is Outcome.BAD_INPUT
             assert ended.detail == (
-                "the deck ended at step 200, not at steps = 100: after a restart write run 100 upto"
+                "the deck ended at step 200, not at steps = 100: after a restart write run 100 "
+                "upto; gone on from restart.b at step 100"
             )
 
 

@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from pathlib import Path
 
+import pandas as pd
 import pytest
 
 from sandmould.bad_input import BadInputError
@@ -54,18 +55,18 @@ def test_a_short_deck_is_computed_whole_once(
 
 def test_a_long_deck_is_foretold_by_its_steps(tmp_path: Path) -> None:
     scenario = short(tmp_path, 10**9).runs[0].scenario
-    core_s = speed.pilot(scenario, tmp_path, pilot_s=6.5)
+    core_s, _ = speed.pilot(scenario, tmp_path, pilot_s=6.5)
     assert core_s is not None
     # The chute takes 20 us to 200 us a step, a thousand million of them hours.
     assert core_s > 3600.0
     without = scenario.model_copy(update={"steps": None})
-    assert speed.pilot(without, tmp_path, pilot_s=0.5) is None
+    assert speed.pilot(without, tmp_path, pilot_s=0.5)[0] is None
 
 
 def test_a_deck_of_several_ranks_has_no_pilot(tmp_path: Path) -> None:
     scenario = short(tmp_path, 2000).runs[0].scenario
     engine = scenario.engine.model_copy(update={"ranks": 2})
-    assert speed.pilot(scenario.model_copy(update={"engine": engine}), tmp_path) is None
+    assert speed.pilot(scenario.model_copy(update={"engine": engine}), tmp_path) == (None, "")
 
 
 def test_a_deck_that_may_not_run_has_no_pilot(
@@ -128,6 +129,79 @@ def test_a_point_that_fails_alone_is_told_and_keeps_nothing_from_running(
 ) -> None:
     measure_speeds(failing(tmp_path, "[8, 32]"), tmp_path / "results")
     assert "Unknown command: nonsense here" in capsys.readouterr().err
+
+
+MEASURING = (
+    "Measuring the speed of this machine, once: about 10 s, and up to 2 min where code is compiled "
+    "first.\n"
+)
+FALLING = """\
+{{% if restart %}}
+units si
+read_restart {{{{ restart }}}}
+{{% else %}}
+units si
+atom_style sphere
+region box block 0 1 0 1 0 1
+create_box 1 box
+create_atoms 1 single 0.5 0.5 0.5
+velocity all set 0 0 0.2
+{{% endif %}}
+pair_style zero 0.1
+pair_coeff * *
+fix gravity all gravity 9.81 vector 0 0 -1
+fix motion all nve/sphere
+{then}
+timestep 1e-4
+variable speed equal vcm(all,z)
+thermo_style custom step time v_speed
+thermo 10
+restart 40 {{{{ restart_files }}}}
+run 100 {upto}
+"""
+
+
+@pytest.mark.parametrize(
+    ("then", "upto", "told"),
+    [
+        ("", "upto", ""),
+        (
+            "velocity all set 0 0 0.2",
+            "upto",
+            "own.in.j2 with the values {}: gone on from a restart file, it comes to other values "
+            "than in one piece: at step 100 speed 0.1411 m/s instead of 0.1019 m/s; they part at "
+            "once, so the deck does not bring back all that it needs.\n",
+        ),
+        (
+            "",
+            "",
+            "own.in.j2 with the values {}: a run that is killed does not go on as it should. the "
+            "deck ended at step 140, not at steps = 100: after a restart write run 100 upto; gone "
+            "on from restart.a at step 40.\n",
+        ),
+    ],
+)
+def test_what_a_restart_changes_is_said_before_the_runs(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str], then: str, upto: str, told: str
+) -> None:
+    (tmp_path / "own.in.j2").write_text(FALLING.format(then=then, upto=upto))
+    (tmp_path / "own.yaml").write_text(
+        "kind: deck\ntrust_deck: true\nobjective: {measure: speed_m_s}\n"
+        "scenario: {template: own.in.j2, measures: {speed_m_s: v_speed}, steps: 100}\n"
+    )
+    plan = open_plan(tmp_path / "own.yaml", tmp_path / "results")
+    for _ in ("measured", "stored"):
+        measure_speeds(plan, tmp_path / "results")
+        assert capsys.readouterr().err.removeprefix(MEASURING) == told
+
+
+def test_what_parts_slowly_is_told_apart() -> None:
+    whole = pd.DataFrame({"log_Step": [0, 1, 2, 3], "speed_m_s": [1.0, 2.0, 3.0, 4.1]})
+    resumed = whole.assign(speed_m_s=[1.0, 2.0, 3.00001, 4.2])
+    told = speed.difference(whole, resumed, ["speed_m_s"])
+    assert "at step 3 speed 4.200 m/s instead of 4.100 m/s; they part slowly" in told
+    near = whole.assign(speed_m_s=[1.0, 2.0, 3.0, 4.104])
+    assert speed.difference(whole, near, ["speed_m_s"]) == ""
 
 
 def test_finished_runs_price_a_deck(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:

@@ -28,6 +28,8 @@ from sandmould.study.plan.lacking import Need
 from sandmould.study.plan.plan_files import VERDICT_FILE
 from tests.planned import announce
 
+REPORT = KindReport()
+
 
 class Fall(Section):
     """A stone that falls."""
@@ -81,7 +83,7 @@ def test_the_smallest_kind_is_planned_computed_and_reported(
     kind = Kind("fall", Fall, FallStudy, FallPlanning, FallExecution)
     monkeypatch.setitem(registry.KINDS, "fall", kind)
     monkeypatch.setitem(registry._OF_SCENARIO, Fall, kind)
-    monkeypatch.setitem(REPORTS, "fall", KindReport())
+    monkeypatch.setitem(REPORTS, "fall", __name__)
     file = tmp_path / "stones.yaml"
     file.write_text(
         "kind: fall\nobjective: {measure: fall_s, better: smaller}\n"

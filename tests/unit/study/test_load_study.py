@@ -14,7 +14,7 @@ from sandmould.bad_input import BadInputError
 from sandmould.scenario.contact import WALL_LAW
 from sandmould.scenario.scenario import Scenario
 from sandmould.study.plan.expand import expand
-from sandmould.study.plan.load_study import OpenStudy, _from_root, display_path, open_study
+from sandmould.study.plan.load_study import OpenStudy, _named_from_root, display_path, open_study
 
 Opened = Callable[..., OpenStudy]
 SHIPPED = sorted((ROOT / "config" / "studies").glob("*.yaml"))
@@ -176,6 +176,6 @@ def test_names_in_messages_hide_the_machine(
     ],
 )
 def test_a_pattern_s_mesh_is_seen_from_the_file_that_names_it(tmp_path: Path, text: str) -> None:
-    tree = _from_root(yaml.safe_load(text), tmp_path / "config")
+    tree = _named_from_root(yaml.safe_load(text), tmp_path / "config", {})
     (file,) = re.findall(r"[^' ]+arch.vtu", str(tree))
     assert (ROOT / file).resolve() == tmp_path / "mesh" / "arch.vtu"

@@ -29,10 +29,9 @@ CASES: dict[str, tuple[str, str]] = {
     ),
     "of a tube that was replaced, by default": (
         f"based_on: tube\nscenario: {{obstacles: [{POLYGON}]}}",
-        "trial.yaml: objective.measure = 'tube_fill_fraction' cannot be used: valid is a measure "
-        "that this scene will have (none is stated: tube_fill_fraction is the default): "
-        "nearest are bearing_fraction, solid_fraction, overlap_p99_fraction; sandmould "
-        "measures lists all.",
+        "trial.yaml: state an objective, such as objective: {measure: grains}: this study measures "
+        "grains, bed_height_m, solid_fraction, apparent_density_raw_kg_m3, "
+        "apparent_density_corrected_kg_m3, coordination, coordination_bearing and 7 others.",
     ),
     "of a tube that was replaced": (
         f"based_on: tube\nscenario: {{obstacles: [{POLYGON}]}}\n"

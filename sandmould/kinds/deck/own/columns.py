@@ -2,20 +2,12 @@
 
 from __future__ import annotations
 
-import contextlib
-import json
 import re
 from collections.abc import Iterator, Sequence
-from pathlib import Path
 
 from sandmould.bad_input import Problem
-from sandmould.digest import digest
-from sandmould.plain_file import read_json
-from sandmould.runs.files import write_text
 from sandmould.scenario.own_deck import CLOCK, OwnDeck
 
-FOUND = "missing_columns.json"
-"""File of a study's folder: which decks were found to lack columns, by their key."""
 _HIDES = ("include", "jump", "if", "python", "shell", "partition")
 """Commands behind which a deck may print what its text does not show."""
 _OF_USER = re.compile(r"^[vcf]_\w+$")
@@ -37,7 +29,7 @@ def column_problems(scenario: OwnDeck, deck: str) -> Iterator[Problem]:
     if "time" not in printed:
         valid = "a deck that prints the time: thermo_style custom step time ..."
         yield Problem("template", scenario.template, valid)
-    for name, column in scenario.measures.items():
+    for name, column in scenario.columns.items():
         # LIGGGHTS heads columns by other names, and so do all engines those of their own.
         if scenario.engine.name == "lammps" and _OF_USER.match(column) and column not in printed:
             valid = f"a column that the deck prints: {', '.join(printed)}"
@@ -74,38 +66,9 @@ def missing_columns(scenario: OwnDeck, columns: Sequence[str]) -> str:
     columns : sequence of str
         Those that it has.
     """
-    wanted = {"the time": CLOCK, **{f"measures.{n}": c for n, c in scenario.measures.items()}}
+    wanted = {"the time": CLOCK, **{f"measures.{n}": c for n, c in scenario.columns.items()}}
     lacks = [f"{column} ({what})" for what, column in wanted.items() if column not in columns]
     if not lacks:
         return ""
     has = ", ".join(columns) or "no table"
     return f"the deck's log lacks the column {', '.join(lacks)}: it has {has}."
-
-
-def deck_key(scenario: OwnDeck, deck: str) -> str:
-    """What decks have in common that print the same columns and are asked for the same."""
-    printing = [" ".join(line) for line in _commands(deck) if line[0].startswith("thermo")]
-    wanted = [f"{name} {column}" for name, column in scenario.measures.items()]
-    files = [scenario.sha256[name] for name in scenario.files]
-    return digest("\n".join([scenario.engine.name, *printing, *sorted(wanted), *sorted(files)]))
-
-
-def found_missing(study_folder: Path, key: str, run: str) -> str:
-    """What another run of the study has shown that a deck lacks; nothing where none has."""
-    other, said = _found(study_folder).get(key, (run, ""))
-    return "" if other == run else f"not computed, since {other} has shown that {said}"
-
-
-def keep_found(study_folder: Path, key: str, run: str, said: str) -> None:
-    """Keep what a run has shown its deck to lack, or that it lacks nothing."""
-    before = _found(study_folder)
-    now = {k: v for k, v in before.items() if k != key} | ({key: (run, said)} if said else {})
-    if now != before:
-        write_text(study_folder / FOUND, json.dumps(now, indent=1))
-
-
-def _found(study_folder: Path) -> dict[str, tuple[str, str]]:
-    with contextlib.suppress(OSError, ValueError, TypeError, AttributeError):
-        tree = read_json(study_folder / FOUND)
-        return {str(key): (str(run), str(said)) for key, (run, said) in tree.items()}
-    return {}

@@ -13,29 +13,28 @@ import pandas as pd
 
 from sandmould.engines.registry import deck_reader, engine_module
 from sandmould.engines.session import EngineStop
-from sandmould.kinds.deck.own.columns import (
-    deck_key,
-    found_missing,
-    keep_found,
-    missing_columns,
-)
+from sandmould.kinds.deck.own.columns import missing_columns
 from sandmould.kinds.deck.own.deck import (
+    OUTPUT,
     RESTART_FILES,
     check_unchanged,
     names_used,
     render,
 )
+from sandmould.kinds.deck.own.measures import measured, missing_dump
 from sandmould.kinds.deck.own.thermo import STEP, Thermo, read_thermo
 from sandmould.runs.outcome import Outcome, RunOutcome
 from sandmould.runs.products import Computed, Cost, cpu_time_s, peak_memory_bytes
 from sandmould.runs.progress import LINE_EVERY_S, Progress
 from sandmould.scenario.own_deck import CLOCK, OwnDeck
 
-OUTPUT = "output"
-"""Folder that a deck runs in; all that it writes there is kept."""
+LOGGED = "log_"
+"""Begins the names of the log's own columns in ``series.tsv``."""
 FLUSH_EVERY_S = 0.5
 """What a killed run can lose of its log."""
 _DECK = "deck.in"
+WENT_ON = "gone on from"
+"""How the outcome of a run that was killed begins to say where it was taken up again."""
 
 
 def compute(scenario: OwnDeck, folder: Path, run: str, study: str) -> Computed:
@@ -62,22 +61,11 @@ def compute(scenario: OwnDeck, folder: Path, run: str, study: str) -> Computed:
     is_root = world is None or world.rank == 0
     work = folder / "work"
     output = work / OUTPUT
-    candidates = _restarts(scenario, work) if is_root else []
+    candidates = [f"../{path.name}" for path in restarts(scenario, work)] if is_root else []
     if world is not None:
         candidates = world.bcast(candidates)
     begun, cpu_begun = time.monotonic(), cpu_time_s()
     cost = Cost(scenario.engine.name, scenario.engine.ranks, math.nan, math.nan)
-    # run folders lie in the folder runs of their study's
-    study_folder, key, known = folder.parent.parent, "", ""
-    if is_root:
-        key = deck_key(scenario, render(scenario, run, study))
-        known = found_missing(study_folder, key, run)
-    if world is not None:
-        known = world.bcast(known)
-    if known:
-        if is_root:
-            output.mkdir(parents=True, exist_ok=True)
-        return Computed(RunOutcome(Outcome.BAD_INPUT, known, 0.0, 0.0), cost, is_root)
     notes: list[str] = []
     outcome, detail = Outcome.FINISHED, ""
     for restart in (*candidates, ""):
@@ -91,18 +79,21 @@ def compute(scenario: OwnDeck, folder: Path, run: str, study: str) -> Computed:
         try:
             with watch:
                 reader.read_deck(output, _DECK, log)
+            if restart and not (rows := read_thermo([log]).table).empty:
+                notes.append(f"{WENT_ON} {Path(restart).name} at step {rows[STEP].iloc[0]:.0f}")
             break
         except EngineStop as stop:
             if restart and read_thermo([log] if log.exists() else []).table.empty:
                 notes.append(f"{Path(restart).name} could not be gone on from: {stop.detail}")
                 continue
             outcome, detail = stop.outcome, stop.detail
+            if is_root:
+                _end_log(log, detail)
             break
     thermo = read_thermo(_logs(work))
     if outcome is Outcome.FINISHED:
         missing = missing_columns(scenario, [str(column) for column in thermo.table])
-        if is_root:
-            keep_found(study_folder, key, run, missing)
+        missing = missing or missing_dump(scenario, output)
         if said := missing or _wrong_end(scenario, thermo, bool(restart)):
             outcome, detail = Outcome.BAD_INPUT, said
     cost.version = str(engine.installed_version())
@@ -136,26 +127,24 @@ def _wrong_end(scenario: OwnDeck, thermo: Thermo, went_on: bool) -> str:
 
 
 def write_series(scenario: OwnDeck, work: Path) -> None:
-    """Write ``series.tsv``: time in s, the measures by name, and the whole log beside them."""
+    """Write ``series.tsv``."""
+    series(scenario, work).to_csv(work / "series.tsv", sep="\t", index=False)
+
+
+def series(scenario: OwnDeck, work: Path) -> pd.DataFrame:
+    """Time in s, the measures by name, and the whole log beside them."""
     table = read_thermo(_logs(work)).table
-    named = {
-        "time_s": CLOCK,
-        **{name: column for name, column in scenario.measures.items() if column in table},
-    }
-    if CLOCK not in table:
-        named.pop("time_s")
-    measured = pd.DataFrame({name: table[column] for name, column in named.items()})
-    whole = table.add_prefix("log_")
-    pd.concat([measured, whole], axis=1).to_csv(work / "series.tsv", sep="\t", index=False)
+    clock = table[[CLOCK]].set_axis(["time_s"], axis=1) if CLOCK in table else table[[]]
+    each = measured(scenario, table, work / OUTPUT)
+    return pd.concat([clock, each, table.add_prefix(LOGGED)], axis=1)
 
 
-def _restarts(scenario: OwnDeck, work: Path) -> list[str]:
-    """Restart files of an earlier attempt as the deck names them, the newest first."""
+def restarts(scenario: OwnDeck, work: Path) -> list[Path]:
+    """Restart files of an earlier attempt, the newest first."""
     if "restart" not in names_used(scenario):
         return []
     files = [work / name for name in RESTART_FILES if (work / name).is_file()]
-    files.sort(key=lambda path: path.stat().st_mtime, reverse=True)
-    return [f"../{path.name}" for path in files]
+    return sorted(files, key=lambda path: path.stat().st_mtime, reverse=True)
 
 
 def _lay_out(scenario: OwnDeck, output: Path, deck: str, goes_on: bool) -> None:
@@ -171,6 +160,13 @@ def _lay_out(scenario: OwnDeck, output: Path, deck: str, goes_on: bool) -> None:
 def _logs(work: Path) -> list[Path]:
     """Logs of all attempts in order."""
     return sorted(work.glob("engine_*.log"), key=lambda path: int(path.stem.split("_")[1]))
+
+
+def _end_log(log: Path, said: str) -> None:
+    """End a log with what the engine said, where it died before it had written that."""
+    text = log.read_text(encoding="utf-8", errors="replace") if log.exists() else ""
+    if "ERROR" not in text:
+        log.write_text(f"{text}\n{said}\n".lstrip(), encoding="utf-8")
 
 
 class _Watch:

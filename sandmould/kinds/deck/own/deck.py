@@ -7,7 +7,7 @@ from collections.abc import Iterator
 from pathlib import Path
 
 from sandmould import SHIPPED
-from sandmould.bad_input import BadInputError, Problem
+from sandmould.bad_input import BadInputError, Problem, display_path
 from sandmould.digest import digest, file_digest
 from sandmould.engines.capabilities import Ranks
 from sandmould.engines.registry import engine_module
@@ -17,6 +17,8 @@ from sandmould.scenario.own_deck import RESERVED, OwnDeck
 
 DECKS = SHIPPED / "config" / "decks"
 """Decks that come with us."""
+OUTPUT = "output"
+"""Folder that a deck runs in; all that it writes there is kept."""
 RESTART_FILES = ("restart.a", "restart.b")
 """Written in turn beside the folder that a deck runs in."""
 
@@ -157,4 +159,6 @@ def check_unchanged(scenario: OwnDeck) -> None:
     changed = [n for n, planned in scenario.sha256.items() if now.get(n) != planned]
     if changed:
         valid = "the file as it was planned: plan the study again to run it as it is now"
-        raise BadInputError([Problem("file", name, valid) for name in changed])
+        raise BadInputError(
+            [Problem("file", display_path(scenario.paths[n]), valid) for n in changed]
+        )

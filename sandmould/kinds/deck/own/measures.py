@@ -1,0 +1,94 @@
+"""Measures of a user's deck at each row of its log, from the log or a dump, over windows."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from itertools import islice
+from pathlib import Path
+
+import numpy as np
+import pandas as pd
+from numpy.typing import NDArray
+
+from sandmould.kinds.deck.own.thermo import STEP
+from sandmould.scenario.own_deck import CLOCK, OwnDeck, Taken
+
+
+def measured(scenario: OwnDeck, table: pd.DataFrame, output: Path) -> pd.DataFrame:
+    """Measures by name, one row a row of the log; those that cannot be read are left out.
+
+    Parameters
+    ----------
+    scenario : OwnDeck
+    table : DataFrame
+        The log.
+    output : Path
+        Folder that the deck writes its dumps into.
+    """
+    found = {}
+    time_s = table[CLOCK].to_numpy() if CLOCK in table else np.full(len(table), np.nan)
+    for name, taken in scenario.taken.items():
+        if not taken.dump and taken.of in table:
+            found[name] = over_window(time_s, table[taken.of].to_numpy(), taken)
+        elif taken.dump and len(table) and (each := dict(_moments(output, taken))):
+            steps, step = table[STEP].to_numpy(), np.array(sorted(each))
+            values = np.array([each[one] for one in step])
+            values = over_window(np.interp(step, steps, time_s), values, taken)
+            newest = np.searchsorted(step, steps, side="right") - 1
+            found[name] = np.where(newest < 0, np.nan, values[newest])
+    return pd.DataFrame(found, index=table.index)
+
+
+def over_window(
+    time_s: NDArray[np.float64], value: NDArray[np.float64], taken: Taken
+) -> NDArray[np.float64]:
+    """What is taken of values up to each moment, (n,) float64 as these; NaN before the window.
+
+    The mean of the line through them, or its rate: over the stretch before a moment at least.
+    """
+    if taken.take == "last":
+        return value
+    begins_s = np.full(len(time_s), taken.from_s or 0.0)
+    if taken.over_last_s is not None:
+        begins_s = time_s - taken.over_last_s
+    first = np.searchsorted(time_s, begins_s - 1e-9 * np.abs(time_s))  # round-off of the clock
+    now, total = np.arange(len(time_s)), value
+    if taken.take == "mean":
+        areas = (value[1:] + value[:-1]) / 2 * np.diff(time_s)
+        total = np.concatenate([[0.0], np.cumsum(areas)])
+    begin = np.minimum(first, np.maximum(now - 1, 0))
+    with np.errstate(divide="ignore", invalid="ignore"):
+        per_s = (total - total[begin]) / (time_s - time_s[begin])
+    return np.where(first > now, np.nan, per_s)
+
+
+def missing_dump(scenario: OwnDeck, output: Path) -> str:
+    """Say which measures cannot be read from a dump; nothing where all can."""
+    lacks = [
+        f"{taken.dump} with {taken.of} (measures.{name})"
+        for name, taken in scenario.taken.items()
+        if taken.dump and not any(_moments(output, taken))
+    ]
+    return f"the deck wrote no {', '.join(lacks)}" if lacks else ""
+
+
+def _moments(output: Path, taken: Taken) -> Iterator[tuple[int, float]]:
+    """Steps of a dump of text and what of the grains counts; a last one cut short is left out.
+
+    A run that went on writes some steps twice.
+    """
+    if not (output / taken.dump).is_file():
+        return
+    step = grains = 0
+    with (output / taken.dump).open(encoding="utf-8", errors="replace") as dump:
+        for line in dump:
+            if line.startswith("ITEM: TIMESTEP"):
+                step = int(next(dump, "0"))
+            elif line.startswith("ITEM: NUMBER OF ATOMS"):
+                grains = int(next(dump, "0"))
+            elif line.startswith("ITEM: ATOMS") and taken.of in (columns := line.split()[2:]):
+                place = columns.index(taken.of)
+                rows = [row.split() for row in islice(dump, grains)]
+                if grains and len(rows) == grains and len(rows[-1]) == len(columns):
+                    column = [float(row[place]) for row in rows]
+                    yield step, float(getattr(np, taken.grains)(column))
