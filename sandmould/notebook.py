@@ -35,7 +35,7 @@ from sandmould.scenario.quantity import NAME
 from sandmould.scenario.scenario import Scenario
 from sandmould.study.collect import Collected, read_collected
 from sandmould.study.plan.build_plan import RESULTS, checked_plan, known_prices, open_plan
-from sandmould.study.plan.plan_files import SUMMARY, VERDICT_FILE, plan_rows, read_run
+from sandmould.study.plan.plan_files import VERDICT_FILE, plan_rows, read_run
 from sandmould.study.plan.price import study_s
 
 AXES = ("x", "z"), ("x", "y", "z")
@@ -85,8 +85,8 @@ class Result:
             Where no results of a study lie there.
         """
         object.__setattr__(self, "folder", Path(folder).absolute())
-        if not (self.folder / SUMMARY).is_file():
-            valid = f"the folder of a study's results, which has its {SUMMARY}"
+        if not (self.folder / VERDICT_FILE).is_file():
+            valid = f"the folder of a study that was computed, which has its {VERDICT_FILE}"
             raise BadInputError([Problem("folder", str(folder), valid)])
 
     @cached_property

@@ -35,7 +35,9 @@ def dry_run(*arguments: str, folder: Path) -> CompletedProcess[str]:
     command = ["snakemake", "--dry-run", "--snakefile", str(ROOT / "Snakefile"), *arguments]
     with tempfile.TemporaryDirectory() as name:
         said = [Path(name, stream) for stream in ("stdout", "stderr")]
-        process = _FORKS.Process(target=_snakemake, args=(command, folder.absolute(), *said))
+        cache = os.environ["XDG_CACHE_HOME"]  # the server of forks has that of an earlier test
+        arguments = (command, folder.absolute(), cache, *said)
+        process = _FORKS.Process(target=_snakemake, args=arguments)
         process.start()
         process.join(LIMIT_S)
         if process.exitcode is None:
@@ -44,7 +46,8 @@ def dry_run(*arguments: str, folder: Path) -> CompletedProcess[str]:
         return CompletedProcess(command, process.exitcode, *(path.read_text() for path in said))
 
 
-def _snakemake(command: list[str], folder: Path, stdout: Path, stderr: Path) -> None:
+def _snakemake(command: list[str], folder: Path, cache: str, stdout: Path, stderr: Path) -> None:
+    os.environ["XDG_CACHE_HOME"] = cache
     for number, path in ((1, stdout), (2, stderr)):
         os.dup2(os.open(path, os.O_WRONLY | os.O_CREAT), number)
     os.chdir(folder)

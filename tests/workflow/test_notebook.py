@@ -82,6 +82,7 @@ def test_the_notebook_is_executed_and_small() -> None:
 
 
 @pytest.mark.slow
+@pytest.mark.usefixtures("unmeasured")
 def test_a_study_is_computed_and_read(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:
@@ -95,7 +96,7 @@ def test_a_study_is_computed_and_read(
     assert yaml.safe_load(Path("little.yaml").read_text(encoding="utf-8"))["title"] == "little"
     said = capsys.readouterr().out
     assert "little: 2 of 2 runs done" in said
-    # This folder is new, so the machine's speed is measured; the plan is told once all the same.
+    # The machine's speed is measured; the plan is told once all the same.
     assert said.count("Measuring the speed of this machine") == 1
     assert said.count("Wall time on 2 cores with report") == 1
     assert result.verdict.startswith("Not resolved")
@@ -149,7 +150,7 @@ def test_what_is_no_study_is_told_before_anything_starts(
         sandmould.run(STUDY | {"replicates": 0}, name="wrong")
     assert not Path("wrong.yaml").exists()
     assert not Path("results").exists()
-    with pytest.raises(BadInputError, match=r"folder = 'results' .* has its summary.tsv"):
+    with pytest.raises(BadInputError, match=r"folder = 'results' .* has its verdict.txt"):
         sandmould.Result("results")
 
 

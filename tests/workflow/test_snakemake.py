@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import shutil
 import subprocess
 import sys
 import zipfile
@@ -41,7 +40,7 @@ def snakemake(*arguments: str, folder: Path) -> subprocess.CompletedProcess[str]
 
 
 @pytest.fixture(scope="session")
-def calibration(tmp_path_factory: pytest.TempPathFactory) -> Path:
+def speeds(tmp_path_factory: pytest.TempPathFactory) -> None:
     """Measure the engines' speeds once for all tests."""
     results = tmp_path_factory.mktemp("results")
     runs = [run for path in STUDIES for run in expand(open_study(path))]
@@ -49,16 +48,14 @@ def calibration(tmp_path_factory: pytest.TempPathFactory) -> Path:
     for run in each.values():
         if speed := kind_of(run.scenario).planning.speed:
             speed.measured(run.scenario, results)
-    return user_cache() / "speeds"
 
 
 @pytest.fixture
-def checkout(tmp_path: Path, calibration: Path) -> Path:
+def checkout(tmp_path: Path, speeds: None) -> Path:
     """Link the repository's parts into an empty folder, so that results lie there."""
     for name in ("Snakefile", "workflow", "templates", "config", "profiles"):
         (tmp_path / name).symlink_to(ROOT / name)
     (tmp_path / "results").mkdir()
-    shutil.copytree(calibration, user_cache() / "speeds")
     return tmp_path
 
 
@@ -77,13 +74,12 @@ def test_dry_run_of_every_study(study: Path, checkout: Path) -> None:
     assert (checkout / "results" / study.stem / "runs.tsv").exists()
 
 
+@pytest.mark.usefixtures("unmeasured")
 def test_a_dry_run_starts_no_engine(checkout: Path) -> None:
-    stored = user_cache() / "speeds"
-    shutil.rmtree(stored)
     ran = dry_run("--cores", "2", folder=checkout)
     assert ran.returncode == 0, ran.stderr
     assert ", an estimate" in ran.stderr
-    assert not stored.exists()
+    assert not (user_cache() / "speeds").exists()
 
 
 def test_a_study_that_rests_on_another_says_what_comes_first(checkout: Path) -> None:

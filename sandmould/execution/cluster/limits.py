@@ -23,7 +23,7 @@ class Demand(NamedTuple):
     memory_mb: int
 
 
-class Limits(NamedTuple):
+class JobLimits(NamedTuple):
     """What every job of a start is allowed."""
 
     longest_min: float = math.inf
@@ -34,7 +34,7 @@ class Limits(NamedTuple):
     """Of the smallest node that it may be sent to."""
 
 
-def limits(cluster: Cluster) -> Limits:
+def limits(cluster: Cluster) -> JobLimits:
     """What the partitions that jobs are sent to allow.
 
     Raises
@@ -56,7 +56,7 @@ def limits(cluster: Cluster) -> Limits:
         allowed.append((60 * cluster.longest_wall_h, f"longest_wall_h of {CLUSTER_FILE}"))
     # "16+" where nodes have 16 and more
     cores = min((int(cores.rstrip("+")) for *_, cores in used), default=math.inf)
-    return Limits(*min(allowed, default=(math.inf, "")), cores)
+    return JobLimits(*min(allowed, default=(math.inf, "")), cores)
 
 
 def minutes(text: str) -> float:

@@ -9,7 +9,7 @@ from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
-from sandmould.execution.cluster.limits import Demand, Limits, check_jobs, limits
+from sandmould.execution.cluster.limits import Demand, JobLimits, check_jobs, limits
 from sandmould.execution.cluster.queue import Job, cancel, jobs_of
 from sandmould.execution.cluster.settings import (
     RESOURCES,
@@ -40,7 +40,7 @@ class Submission:
         """
         self._plan = plan
         self._cluster = cluster or Cluster()
-        self._limits = Limits()
+        self._limits = JobLimits()
         self._earlier: list[Job] = []
         self._asked_s = -math.inf
         self.said: list[str] = []

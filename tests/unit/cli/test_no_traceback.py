@@ -14,6 +14,8 @@ from typer.testing import CliRunner
 
 from sandmould import ROOT
 from sandmould.cli.commands import app
+from sandmould.study.plan.build_plan import open_plan
+from sandmould.study.plan.plan_files import write_run
 
 CASTING = """\
 kind: solidification
@@ -82,11 +84,13 @@ def test_a_file_that_is_no_study(verb: str, elsewhere: Path) -> None:
     assert not Path("results").exists()
 
 
+@pytest.mark.usefixtures("unmeasured")
 def test_results_that_are_damaged(elsewhere: Path) -> None:
     Path("bar.yaml").write_text(CASTING)
     status, (line,) = said("plan", "bar.yaml")
     assert (status, line.startswith("Measuring the speed of this machine, once")) == (0, True)
-    (run,) = Path("results", "bar", "runs").iterdir()
+    (planned,) = open_plan(Path("bar.yaml")).runs
+    run = write_run(planned, Path("results", "bar"))
     of_study = [Path("results", "bar", name) for name in ("runs.tsv", "study.yaml", "summary.tsv")]
     of_run = [run / name for name in ("outcome.json", "cost.tsv", "scenario.yaml")]
     (run / "work").mkdir()

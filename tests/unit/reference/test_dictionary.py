@@ -147,6 +147,7 @@ def test_results_go_where_they_are_asked(ends_with: Any) -> None:
     assert not Path("mine.yaml").exists()
 
 
+@pytest.mark.usefixtures("unmeasured")
 def test_a_plan_is_a_table_with_units() -> None:
     table = sandmould.plan(STUDY | {"replicates": 2}, cores=2)
     ofsweep = table[table["part"] == "sweep"]
