@@ -34,7 +34,7 @@ from sandmould.runs.columns import RUN
 from sandmould.scenario.quantity import NAME
 from sandmould.scenario.scenario import Scenario
 from sandmould.study.collect import Collected, read_collected
-from sandmould.study.plan.build_plan import RESULTS, checked_plan, known_prices, open_plan
+from sandmould.study.plan.build_plan import RESULTS, Plan, checked_plan, known_prices, open_plan
 from sandmould.study.plan.plan_files import VERDICT_FILE, plan_rows, read_run
 from sandmould.study.plan.price import study_s
 
@@ -334,10 +334,7 @@ def status(study: Study, *, name: str = "study", folder: str | os.PathLike[str] 
     BadInputError
         With one sentence a problem.
     """
-    place = Path(folder).absolute()
-    path, text = _file_and_text(study, name, place)
-    with _within(place):
-        opened = open_plan(path, text=text)
+    with _opened(study, name, folder) as opened:
         found = run_statuses(opened, RESULTS, opened.lacks(RESULTS), live_jobs())
     return pd.DataFrame([asdict(each) for each in found.values()])
 
@@ -399,10 +396,7 @@ def plan(
     BadInputError
         With one sentence a problem.
     """
-    place = Path(folder).absolute()
-    path, text = _file_and_text(study, name, place)
-    with _within(place):
-        opened = open_plan(path, text=text)
+    with _opened(study, name, folder) as opened:
         prices = known_prices(opened, RESULTS)
     runs = [*opened.fills, *opened.runs]
     table = pd.DataFrame(plan_rows(runs, prices))
@@ -410,6 +404,15 @@ def plan(
     table.attrs["wall_time_s"] = study_s(pieces, cores or os.cpu_count() or 1)
     table.attrs["price"] = prices.basis(runs)
     return table
+
+
+@contextlib.contextmanager
+def _opened(study: Study, name: str, folder: str | os.PathLike[str]) -> Iterator[Plan]:
+    """The plan of a study that is not written, in the folder of its results."""
+    place = Path(folder).absolute()
+    path, text = _file_and_text(study, name, place)
+    with _within(place):
+        yield open_plan(path, text=text)
 
 
 def _file_and_text(study: Study, name: str, folder: Path) -> tuple[Path, str | None]:
