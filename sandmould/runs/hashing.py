@@ -29,12 +29,14 @@ def scenario_hash(scenario: Section) -> str:
     """
     seed = {"seed"} & type(scenario).model_fields.keys()
     key = type(scenario), scenario.model_dump_json(exclude=seed)
-    if key not in _SEEDLESS:
-        _SEEDLESS.clear()  # replicates of a point follow each other
-        _SEEDLESS[key] = {name: value for name, value in said(scenario).items() if name != "seed"}
+    values = _SEEDLESS.get(key)  # replicates of a point follow each other
+    if values is None:
+        values = {name: value for name, value in said(scenario).items() if name != "seed"}
+        _SEEDLESS.clear()
+        _SEEDLESS[key] = values
     own = {name: getattr(scenario, name) for name in seed}
     stated = {name: n for name, n in own.items() if n != _defaults(type(scenario))[name]}
-    return digest(json.dumps(_SEEDLESS[key] | stated, sort_keys=True))
+    return digest(json.dumps(values | stated, sort_keys=True))
 
 
 def said(scenario: Section) -> dict[str, Any]:

@@ -113,13 +113,14 @@ def write_run(run: Run, folder: Path) -> Path:
     kind = kind_of(run.scenario).name
     file = _file_model(kind)(kind=kind, **{name: getattr(run, name) for name in _OF_RUN})
     # Most of a plan's time would be YAML, so the first line says what the others come from.
-    head = f"# Plan {digest(file.model_dump_json())[:SHORT]}. Change the study instead.\n".encode()
+    state = digest(file.model_dump_json())[:SHORT]
+    head = f"# Written by the plan, state {state}. Change the study instead.\n"
     path = place / SCENARIO_FILE
-    if not path.is_file() or not path.read_bytes().startswith(head):
+    if not path.is_file() or not path.read_bytes().startswith(head.encode()):
         tree = file.model_dump(mode="json")
         text = yaml.dump(tree, Dumper=_Dumper, sort_keys=False, allow_unicode=True, width=100)
         place.mkdir(parents=True, exist_ok=True)
-        write_text(path, f"{head.decode()}{text}")
+        write_text(path, f"{head}{text}")
     return place
 
 
