@@ -13,9 +13,10 @@ from typing import Literal
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.ndimage import label, maximum_filter, minimum_filter
+from scipy.ndimage import label
 from scipy.spatial import cKDTree
 
+from sandmould.analysis.bed_density import buried_places
 from sandmould.analysis.free_space import free_part
 from sandmould.analysis.intersections import disc_lens_m2, sphere_lens_m3
 from sandmould.geometry.geometry import Array, Scene, Solid, Wall, distance_within
@@ -77,7 +78,7 @@ def find_loose_sand(position_m: Array, radius_m: Array, scene: Scene, grain_m: f
         Diameter of the mass-median grain.
     """
     ball_m, cell_m = 0.5 * BALL_GRAINS * grain_m, grain_m / CELLS_A_GRAIN
-    grid, is_buried = _buried_places(position_m, radius_m, ball_m, cell_m)
+    grid, is_buried = buried_places(position_m, radius_m, ball_m, cell_m)
     from_solid_m = _distance_m(scene.solids, grid, 2.0 * ball_m)
     from_wall_m = _distance_m(scene.walls, grid, 2.0 * ball_m)
     clear_m = np.minimum(from_solid_m, from_wall_m)
@@ -98,29 +99,6 @@ def find_loose_sand(position_m: Array, radius_m: Array, scene: Scene, grain_m: f
         },
         _zones(grid, loose, local, side, cell_m, grain_m),
     )
-
-
-def _buried_places(
-    position_m: Array, radius_m: Array, ball_m: float, cell_m: float
-) -> tuple[Array, NDArray[np.bool_]]:
-    """Places among all grains, (..., d) float64, m, and which lie a ball's radius below the sand.
-
-    The sand's surface at a place is the lowest within a ball's radius of what the highest grain
-    within half of that makes it.
-    """
-    dimension = position_m.shape[1]
-    if not len(position_m):
-        return np.zeros((0,) * dimension + (dimension,)), np.zeros((0,) * dimension, dtype=np.bool_)
-    low_m, high_m = position_m.min(axis=0), position_m.max(axis=0)
-    cells = np.ceil((high_m - low_m) / cell_m).astype(int) + 1
-    axes = [low + cell_m * np.arange(n) for low, n in zip(low_m, cells, strict=True)]
-    grid = np.stack(np.meshgrid(*axes, indexing="ij"), axis=-1)
-    top_m = np.full(cells[:-1], -np.inf)
-    column = np.rint((position_m - low_m) / cell_m).astype(int)[:, :-1]
-    np.maximum.at(top_m, tuple(column.T), position_m[:, -1] + radius_m)
-    reach = max(1, round(ball_m / cell_m))
-    top_m = minimum_filter(maximum_filter(top_m, 2 * (reach // 2) + 1), 2 * reach + 1)
-    return grid, grid[..., -1] <= top_m[..., None] - ball_m
 
 
 def _distance_m(surfaces: tuple[Wall | Solid, ...], grid: Array, reach_m: float) -> Array:

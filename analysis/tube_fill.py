@@ -6,6 +6,7 @@ from dataclasses import dataclass
 from itertools import pairwise
 
 import numpy as np
+from numpy.typing import NDArray
 
 from sandmould.analysis.intersections import depth_in_polygon_m, disc_polygon_m2, sphere_prism_m3
 from sandmould.geometry.geometry import Array, Bore
@@ -51,14 +52,13 @@ def tube_fill(
     # opening or behind it make the front
     in_line = _across_inside_m(across_m, bore) > 0.0
     edge_m = np.minimum(depth_m + radius_m, bore.length_m)[in_line & (part > 0.0)]
-    inside = in_line & (depth_m > 0.0) & (depth_m < bore.length_m)
     edges_m = np.zeros(0) if depth_edges_m is None else np.asarray(depth_edges_m, dtype=np.float64)
     slab = [_part(position_m, radius_m, bore, a, b).sum() for a, b in pairwise(edges_m.tolist())]
     sand = float(part.sum())
     return TubeFill(
         sand_measure=sand,
         fill_fraction=sand / bore.measure,
-        grains_inside=int(inside.sum()),
+        grains_inside=int(lies_in_bore(position_m, bore).sum()),
         front_depth_m=float(edge_m.max(initial=0.0)),
         depth_edges_m=edges_m,
         profile_fraction=np.array(slab) / (bore.section_measure * np.diff(edges_m)),
@@ -80,6 +80,13 @@ def sand_in_bore(position_m: Array, radius_m: Array, bore: Bore) -> Array:
         In 3D grains cut by an edge of the bore carry an error below 1e-6 of their part.
     """
     return _part(position_m, radius_m, bore, 0.0, bore.length_m)
+
+
+def lies_in_bore(position_m: Array, bore: Bore) -> NDArray[np.bool_]:
+    """Tell which points lie in a bore, (n,) bool."""
+    depth_m, across_m = bore.local(position_m)
+    inside = _across_inside_m(across_m, bore) > 0.0
+    return inside & (depth_m > 0.0) & (depth_m < bore.length_m)
 
 
 def _part(position_m: Array, radius_m: Array, bore: Bore, from_m: float, to_m: float) -> Array:

@@ -192,3 +192,14 @@ def cavity_grid(
     points_m = np.stack(np.meshgrid(*axes_m, indexing="ij"), axis=-1)
     inside_m = -cavity.space.distance_m(points_m.reshape(-1, len(size_m)))
     return CavityGrid(cell_m, points_m, inside_m.reshape(points_m.shape[:-1]))
+
+
+def drawn_inside(cavity: Cavity, number: int) -> Array:
+    """Places in a cavity, of so many drawn at random in the box round it, (n, d) float64, m.
+
+    A grid lies on facets, or beside them, all along.
+    """
+    corners_m = cavity.space.corners()
+    low_m, high_m = corners_m.min(axis=0), corners_m.max(axis=0)
+    drawn_m = np.random.default_rng(0).uniform(low_m, high_m, (number, len(low_m)))
+    return drawn_m[cavity.space.distance_m(drawn_m) < 0.0]

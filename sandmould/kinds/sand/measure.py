@@ -12,6 +12,7 @@ import numpy as np
 import pandas as pd
 from matplotlib.figure import Figure
 
+from sandmould.analysis.bed_density import own_solid_fraction
 from sandmould.analysis.cavity_fill import cavity_fill, cavity_voids
 from sandmould.analysis.coordination import contacts
 from sandmould.analysis.deflection import fill_under
@@ -20,6 +21,7 @@ from sandmould.analysis.export import solids_to_vtk, to_ovito, to_vtk
 from sandmould.analysis.layers import mixing_index
 from sandmould.analysis.loose_zones import LooseSand
 from sandmould.analysis.plots import draw_by_layer, draw_scene
+from sandmould.analysis.reached_space import reached_share
 from sandmould.analysis.solid_fraction import (
     bed_surface_height_m,
     mean_solid_fraction,
@@ -81,10 +83,11 @@ def measure_snapshot(scenario: Scenario, snapshot: Snapshot) -> dict[str, Any]:
         OVERLAP_P99_FRACTION: touching.overlap_p99_fraction,
         "layer_mixing_index": mixing_index(position, snapshot.layer),
     }
-    packed = row["solid_fraction"]
+    grain_m = scenario.sand.mass_median_diameter_m
+    own = own_solid_fraction(position, radius, scene, grain_m)
+    packed = row["bed_solid_fraction"] = own if math.isfinite(own) else row["solid_fraction"]
     for number, cavity in enumerate(scene.cavities):
-        free = free_share(scenario, number)
-        row |= _measure_cavity(scenario, snapshot, scene, cavity, packed, free)
+        row |= _measure_cavity(scenario, snapshot, scene, cavity, number, packed)
     for bore in scenario.scene.bores:
         filled = row[f"{bore.name}_fill_fraction"]
         row[f"{bore.name}_fill_of_bed_fraction"] = filled / packed if packed else math.nan
@@ -98,19 +101,22 @@ def _measure_cavity(
     snapshot: Snapshot,
     scene: Scene,
     cavity: Cavity,
+    number: int,
     packed: float,
-    free: float,
 ) -> dict[str, float]:
-    """Columns of one cavity, beside sand of a bed's solid fraction; a share of it is free."""
+    """Columns of one cavity, by its number, beside sand of a bed's own solid fraction."""
     position, radius, name = snapshot.position_m, snapshot.radius_m, cavity.name
     grain_m = scenario.sand.mass_median_diameter_m
     unit = "m2" if scenario.dimension == 2 else "m3"
+    free, fits = (
+        free_share(scenario, number),
+        packed * reached_share(cavity, scenario.scene, grain_m),
+    )
     fill = cavity_fill(position, radius, cavity, grain_m, packed)
-    filled = fill.fill_fraction / free
     voids = cavity_voids(position, radius, cavity, scene, grain_m)
     return {
-        f"{name}_fill_fraction": filled,
-        f"{name}_fill_of_bed_fraction": filled / packed if packed else math.nan,
+        f"{name}_fill_fraction": fill.fill_fraction / free,
+        f"{name}_fill_of_bed_fraction": fill.fill_fraction / fits if fits else math.nan,
         f"{name}_sand_{unit}": fill.sand_measure,
         f"{name}_grains": fill.grains_inside,
         f"{name}_filled_depth_m": fill.filled_depth_m,

@@ -27,8 +27,9 @@ from sandmould.scenario.solids import READ_BYTES, SolidMesh, with_hash
 
 MEASURING = (
     *(f"sandmould/analysis/{name}.py" for name in (
-        "cavity_fill", "coordination", "deflection", "density", "free_space", "intersections",
-        "layers", "loose_zones", "mesh_parts", "repose", "sections", "solid_fraction", "tube_fill",
+        "bed_density", "cavity_fill", "coordination", "deflection", "density", "free_space",
+        "intersections", "layers", "loose_zones", "mesh_parts", "reached_space", "repose",
+        "sections", "solid_fraction", "tube_fill",
     )),
     *(f"sandmould/kinds/sand/{name}.py" for name in (
         "bending", "drive", "loose", "measure", "moments", "outflow",

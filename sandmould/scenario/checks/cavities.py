@@ -22,6 +22,7 @@ from sandmould.scenario.cavities import (
     PolygonCavity,
     cavity_grid,
     cavity_space,
+    drawn_inside,
     inward,
 )
 from sandmould.scenario.scenario import Scenario
@@ -128,7 +129,7 @@ def _of_place(s: Scenario, cavity: AnyCavity, space: Cavity, key: str) -> Iterat
 
 
 def free_share(s: Scenario, number: int) -> float:
-    """Share of a cavity that sand can come to: what facets leave of it among meshes.
+    """Share of a cavity that no obstacle fills: what facets leave of it among meshes.
 
     Parameters
     ----------
@@ -218,16 +219,10 @@ def _overlap(
     dimension: int,
     reach_m: float,
 ) -> tuple[float, float]:
-    """Share of a cavity that lies in solids, and how deep it does; deeper than a reach is not told.
-
-    Places are drawn at random: a grid lies on facets, or beside them, all along.
-    """
+    """Share of a cavity that lies in solids, and how deep it does, up to a reach."""
     scene = build_scene(box, obstacles, dimension).without(gate)
     space = cavity_space(cavity, dimension, "cavities")
-    corners_m = space.space.corners()
-    low_m, high_m = corners_m.min(axis=0), corners_m.max(axis=0)
-    drawn_m = np.random.default_rng(0).uniform(low_m, high_m, (_DRAWN, len(low_m)))
-    inside_m = drawn_m[space.space.distance_m(drawn_m) < 0.0]
+    inside_m = drawn_inside(space, _DRAWN)
     clear_m = scene.clearance_m(inside_m, reach_m)
     share = float((clear_m < 0.0).sum() / max(1, len(inside_m)))
     return share, max(0.0, -float(clear_m.min(initial=0.0)))

@@ -33,11 +33,13 @@ def box(*blocks: Block) -> Scene:
     return Scene(3, walls, blocks, ())
 
 
-def lattice() -> np.ndarray:
-    """Spheres that touch, in rows parallel to the box, round the block."""
+def lattice_round(*blocks: Block) -> np.ndarray:
+    """Spheres that touch, in rows parallel to the box, but for those in blocks."""
     axes = [GRAIN_M * (np.arange(n) + 0.5) for n in (ACROSS, ACROSS, DEEP)]
     places = np.stack(np.meshgrid(*axes, indexing="ij"), axis=-1).reshape(-1, 3)
-    return places[np.any(np.abs(places - BLOCK.centre_m) > BLOCK.half_size_m, axis=1)]
+    for block in blocks:
+        places = places[np.any(np.abs(places - block.centre_m) > block.half_size_m, axis=1)]
+    return places
 
 
 def found(places: np.ndarray) -> LooseSand:
@@ -46,14 +48,14 @@ def found(places: np.ndarray) -> LooseSand:
 
 
 def test_a_lattice_round_a_block_is_loose_nowhere() -> None:
-    loose = found(lattice())
+    loose = found(lattice_round(BLOCK))
     assert loose.loose_fraction == 0.0
     assert loose.zones == ()
     assert all(loose.side_fraction[side] == 0.0 for side in SIDES)
 
 
 def test_spheres_taken_from_under_a_block_leave_one_zone_under_it() -> None:
-    places = lattice()
+    places = lattice_round(BLOCK)
     under = np.abs(places - [0.007, 0.007, 0.0065]) <= np.array([0.0031, 0.0031, 0.0016])
     loose = found(places[~under.all(axis=1)])
     assert under.all(axis=1).sum() == 6 * 6 * 3
@@ -69,7 +71,7 @@ def test_spheres_taken_from_under_a_block_leave_one_zone_under_it() -> None:
 
 def test_a_heap_has_no_loose_sand_under_its_slope() -> None:
     """What lies within a ball of the open surface is no place of the bed."""
-    places = lattice()
+    places = lattice_round(BLOCK)
     loose = found(places[places[:, 2] < 0.008 + 0.5 * places[:, 0]])
     assert loose.loose_fraction < 0.01
 
