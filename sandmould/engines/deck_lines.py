@@ -10,6 +10,7 @@ from pydantic import BaseModel
 
 from sandmould.engines.deck import exact, remark
 from sandmould.engines.program import Program, Stage
+from sandmould.scenario.contact import coarser_than_default
 from sandmould.scenario.placement import predicted_bed_height_m
 from sandmould.scenario.scenario import Scenario
 from sandmould.scenario.stages import StageKind
@@ -75,7 +76,12 @@ class Lines:
                 f", {given:g} multiplied for a wave speed of {contact.wave_speed_m_s:g} m/s",
             )
         scale = contact.springs_at_size_scale
-        return value, f", {given:g} at size_scale {scale:g}, times {sand.size_scale:g}/{scale:g}"
+        coarser = coarser_than_default(sand)
+        of_sieve = "" if coarser == 1.0 else f" and {coarser:.4g} of the sieve curve"
+        return (
+            value,
+            f", {given:g} at size_scale {scale:g}, times {sand.size_scale:g}/{scale:g}{of_sieve}",
+        )
 
 
 def simulation_box(scenario: Scenario, program: Program) -> list[tuple[float, float]]:

@@ -23,11 +23,11 @@ from sandmould.scenario.scenario import Scenario
 from sandmould.scenario.solids import SolidMesh
 
 _OF_EVERY_ENGINE = (
-    "scenario/placement.py", "engines/program.py", "engines/step_counts.py",
+    "scenario/contact.py", "scenario/placement.py", "engines/program.py", "engines/step_counts.py",
     "engines/box_motion.py", "engines/staged_session.py", "engines/deck_session.py",
     "engines/driver.py", "engines/guard.py", "engines/bed_step.py",
 )  # fmt: skip
-"""Where grains begin, how stages follow each other, when they end, what stops a run."""
+"""How hard sand is, where grains begin, how stages follow each other and end, what stops a run."""
 
 
 class EngineModule(Protocol):

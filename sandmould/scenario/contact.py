@@ -104,9 +104,10 @@ class Contact(Section):
     grain_wall: ContactLaw = Field(WALL_LAW, description="Law between a grain and a rigid wall.")
     springs_at_size_scale: float | None = quantity(
         4.0,
-        "sand.size_scale that the springs belong to. At another scale all springs are multiplied "
-        "by size_scale over it, so that coarser grains make sand as hard. This holds in 3D and "
-        "for discs as thick as a grain. null: springs are used as given.",
+        "sand.size_scale that the springs belong to, with the default sieve curve. All springs are "
+        "multiplied by the mass-median diameter over that one's, so that neither a scale nor a "
+        "sieve curve makes sand harder. This holds in 3D and for discs as thick as a grain. null: "
+        "springs are used as given.",
         source=PAPER,
         gt=0,
         le=100,
@@ -236,7 +237,12 @@ def spring_factor(sand: Sand, contact: Contact, dimension: int) -> float:
     own_thickness = dimension == 2 and sand.disc_thickness_m != "grain"
     if contact.springs_at_size_scale is None or own_thickness:
         return 1.0
-    return sand.size_scale / contact.springs_at_size_scale
+    return sand.size_scale / contact.springs_at_size_scale * coarser_than_default(sand)
+
+
+def coarser_than_default(sand: Sand) -> float:
+    """Mass-median diameter of the real sand over that of the default sieve curve."""
+    return sand.real_median_m / Sand().real_median_m
 
 
 def springs_in_use(sand: Sand, contact: Contact, dimension: int) -> Contact:

@@ -114,13 +114,18 @@ class Sand(Section):
 
     @property
     def mass_median_diameter_m(self) -> float:
-        """Diameter that half of the modelled sand's mass is finer than.
+        """Diameter that half of the modelled sand's mass is finer than."""
+        return self.real_median_m * self.size_scale
+
+    @property
+    def real_median_m(self) -> float:
+        """The same of the real sand.
 
         Read off the sieve curve, which is taken as straight between openings.
         """
         passing = [p.passing_fraction for p in self.sieve]
         opening_m = [p.opening_m for p in self.sieve]
-        return float(np.interp(0.5, passing, opening_m)) * self.size_scale
+        return float(np.interp(0.5, passing, opening_m))
 
     def mean_diameter_m(self, dimension: int) -> float:
         """Mean diameter of the modelled grains by number."""

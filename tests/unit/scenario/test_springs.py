@@ -57,6 +57,18 @@ def test_coarser_grains_have_the_same_wave_speed(
         assert springs.rolling_stiffness_n_m == springs.normal_stiffness_n_m
 
 
+@pytest.mark.parametrize("dimension", [2, 3])
+def test_another_sieve_curve_changes_no_wave_speed(dimension: int) -> None:
+    passing = {0.1e-3: 0.0, 0.2e-3: 0.3, 0.4e-3: 0.8, 0.8e-3: 1.0}
+    sieve = [{"opening_m": m, "passing_fraction": p} for m, p in passing.items()]
+    finer = scene(dimension=dimension, sand={"sieve": sieve})
+    assert finer.sand.real_median_m == pytest.approx(0.28e-3)
+    assert speed_of(finer) == pytest.approx(speed_of(scene(dimension=dimension)))
+    lines = Lines(finer, {}).in_use("contact.grain_grain.normal_stiffness_n_m")
+    assert lines[0] == pytest.approx(PAPER_N_M * 0.28 / 0.57)
+    assert lines[1] == ", 70000 at size_scale 4, times 4/4 and 0.4912 of the sieve curve"
+
+
 @pytest.mark.parametrize(
     "changes",
     [
