@@ -219,6 +219,7 @@ clean:
 	rm -rf results .snakemake
 
 $(INSTALLED): requirements.lock pyproject.toml
+	@echo 'Installing into .venv: 1.4 GB, two minutes or more.'
 	$(PYTHON) -m venv .venv
 	$(BIN)/pip install --quiet --disable-pip-version-check --require-hashes -r requirements.lock
 	$(BIN)/pip install --quiet --disable-pip-version-check --no-deps --no-build-isolation --editable .
