@@ -43,7 +43,7 @@ def own_solid_fraction(position_m: Array, radius_m: Array, scene: Scene, grain_m
     """
     if not len(position_m):
         return np.nan
-    size_m = np.ptp(position_m, axis=0)
+    size_m = np.ptp(position_m, axis=0) + grain_m
     cell_m = float(np.prod(size_m) / PLACES) ** (1.0 / len(size_m))
     cell_m = min(cell_m, grain_m / PLACES_A_GRAIN)
     grid, is_buried = buried_places(position_m, radius_m, grain_m, cell_m)
