@@ -1,7 +1,7 @@
 """What the frequency that fills a tube best goes with.
 
-``python -m benchmarks.frequency_law`` computes nothing: it writes docs/frequency_law.md from the
-records of the studies ``tube_law_*``, those that are there.
+``python -m benchmarks.frequency_law`` computes nothing: it writes docs/frequency_law.md and
+config/fill_map.yaml from the records of the studies ``tube_law_*``, those that are there.
 """
 
 from __future__ import annotations
@@ -9,6 +9,7 @@ from __future__ import annotations
 from benchmarks.frame import Benchmark
 from benchmarks.frequency_law import page
 from sandmould import ROOT
+from sandmould.kinds.sand.fill_map import MAP
 
 BENCHMARK = Benchmark(
     __file__,
@@ -21,3 +22,4 @@ BENCHMARK = Benchmark(
 
 if __name__ == "__main__":
     BENCHMARK.command()
+    MAP.write_text(page.fill_map(), encoding="utf-8")

@@ -13,6 +13,7 @@ import pandas as pd
 from benchmarks.frame import render
 from benchmarks.frequency_law import chart, groups, groups_chart
 from benchmarks.frequency_law.controls import RecordedCurves
+from benchmarks.frequency_law.fill_map import map_text
 from benchmarks.frequency_law.series import FREQUENCY, series_of
 from sandmould import ROOT
 from sandmould.execution.records import RECORDS
@@ -37,6 +38,8 @@ HELD_OUT = {
     "tube_thickness_certified": "discs 10 mm thick instead of 3.42 mm",
 }
 """Studies of the same tube that the law is asked for, not fitted to; what is special in them."""
+OF_THE_TUBE = ("tube_frequency", "tube_frequency_stroke")
+"""Those that differ in the size of their grains alone: a plan's map is fitted to them as well."""
 FEWEST_CURVES = 3
 """Of a study that is asked at several times: a curve is predicted from the others."""
 PREDICTED_M_S = (0.02, 0.04, 0.08)
@@ -64,6 +67,15 @@ def page(records: Path = RECORDS, picture: Path | None = None) -> str:
         "number": number,
     }
     return render(Path(__file__).with_name("page.md.j2"), values)
+
+
+def fill_map(records: Path = RECORDS) -> str:
+    """Tabulate the law of all recorded curves of its tube and its sand, for plans of studies."""
+    curves = [s for name in COLLAPSED for s in _recorded(records)[name]["series"]]
+    others = [RecordedCurves(records / name) for name in OF_THE_TUBE]
+    settings = groups.settings_of([*curves, *(c for other in others for c in other.curves)])
+    thrown = groups.thrown(settings)
+    return map_text(thrown, groups.error_of(thrown))
 
 
 def evidence(records: Path = RECORDS) -> str:

@@ -11,7 +11,6 @@ from sandmould.kernel_cache import are_compiled, cache_folder
 from sandmould.kinds.kind import Note
 from sandmould.kinds.sand.hardness_text import hardness_lines
 from sandmould.kinds.sand.narrow import narrow_spaces
-from sandmould.kinds.sand.table_motion import frequency_rule
 from sandmould.runs.formatting import number
 from sandmould.scenario.checks.wall_thickness import thinnest_wall
 from sandmould.scenario.hardness import bed_hardness
@@ -32,8 +31,6 @@ def notes(scenario: Scenario) -> list[Note]:
     smallest_m = scenario.sand.classes(scenario.dimension)[0].diameter_m
     hardness = bed_hardness(scenario)
     told = [Note(head, text, head) for head, text in hardness_lines(hardness)] if hardness else []
-    if rule := frequency_rule(scenario, hardness):
-        told.append(Note("frequency rule", rule, "Frequency"))
     told += [Note(f"width of {name}", text) for name, text in narrow_spaces(scenario).items()]
     if registry.calls_our_kernels(scenario) and not are_compiled("dem", _kernel_folder()):
         text = (

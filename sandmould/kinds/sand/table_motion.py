@@ -4,14 +4,12 @@ from __future__ import annotations
 
 from collections.abc import Iterable
 
+from sandmould.kinds.sand.fill_map import best_by_records
 from sandmould.runs.formatting import number
 from sandmould.scenario.drive import BoxDrive, laid_down_drive
-from sandmould.scenario.hardness import Hardness
 from sandmould.scenario.scenario import Scenario
 
 LISTED_SETTINGS = 12
-LEAST_SHARE = 0.25
-"""Of c/(4 H): from this frequency on the tube of docs/frequency_law.md fills well."""
 _HEADS = ("frequency", "amplitude*", "velocity", "acceleration")
 
 
@@ -40,6 +38,8 @@ def table_lines(scenarios: Iterable[Scenario]) -> list[str]:
     lines.append(f"  * half of peak to peak{empty}")
     if any(throws_no_sand(scenario) for scenario in every):
         lines.append("  Below 1 g the box never throws the sand: expect little.")
+    if foretold := best_by_records(every):
+        lines.append(f"  {foretold}")
     return lines
 
 
@@ -61,21 +61,4 @@ def _row(drive: BoxDrive) -> tuple[str, str, str, str]:
         f"{number(1e3 * drive.displacement_m)} mm",
         f"{number(1e3 * drive.velocity_m_s)} mm/s",
         f"{number(drive.acceleration_g)} g",
-    )
-
-
-def frequency_rule(scenario: Scenario, hardness: Hardness | None) -> str:
-    """From which frequency on a bed that is shaken upright should fill a cavity well.
-
-    Empty for other scenes.
-    """
-    scene = scenario.scene
-    if hardness is None or not scenario.vibrations or not (scene.bores or scene.cavities):
-        return ""
-    if any(stage.unit_direction(scenario.dimension)[-1] < 1.0 for stage in scenario.vibrations):
-        return ""
-    from_hz = LEAST_SHARE * hardness.column_hz
-    return (
-        f"Expect good filling from about {number(from_hz, 2)} Hz on: 0.25 c/(4 H) at this wave "
-        "speed. The rule comes from one tube in 2D; one in 3D agrees: docs/frequency_law.md."
     )

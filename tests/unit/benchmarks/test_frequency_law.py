@@ -8,8 +8,19 @@ import numpy as np
 import pandas as pd
 import pytest
 
-from benchmarks.frequency_law.groups import LAW, collapses, held_out, settings_of
+from benchmarks.frequency_law.controls import RecordedCurves
+from benchmarks.frequency_law.groups import (
+    LAW,
+    FillLaw,
+    collapses,
+    held_out,
+    settings_of,
+    thrown,
+)
+from benchmarks.frequency_law.page import COLLAPSED, HELD_OUT, OF_THE_TUBE, _recorded, fill_map
 from benchmarks.frequency_law.series import FREQUENCY, MEASURE, series_of
+from sandmould.execution.records import RECORDS
+from sandmould.kinds.sand.fill_map import MAP
 from sandmould.runs.columns import OUTCOME_CODE, REPLICATE, SEED
 from sandmould.scenario.scenario import Scenario
 
@@ -100,3 +111,28 @@ def test_a_single_group_is_best_where_the_fill_goes_with_it_alone() -> None:
     best = collapses(settings, ("velocity_m_s", "frequency_hz"))[0]
     assert best.groups == ("frequency_hz",)
     assert best.error < 0.1 * settings["fill"].std()
+
+
+def test_the_frequency_that_others_foretell_loses_little_where_the_acceleration_is_held() -> None:
+    recorded = _recorded(RECORDS)
+    curves = [
+        c for study in recorded.values() for c in study["series"] if c.scenario.dimension == 2
+    ]
+    for name in HELD_OUT:
+        curves += RecordedCurves(RECORDS / name).curves
+    settings = thrown(settings_of(curves))
+    regrets = []
+    for curve in settings["curve"].unique():
+        mine = settings[settings["curve"] == curve]
+        if mine["acceleration_g"].max() > 1.05 * mine["acceleration_g"].min():
+            continue
+        of_tube = settings["study"].isin((*COLLAPSED, *OF_THE_TUBE))
+        law = FillLaw(settings[of_tube & (settings["curve"] != curve)])
+        regrets.append(mine["fill"].max() - mine["fill"].iloc[int(law.at(mine).argmax())])
+    assert len(regrets) == 11
+    assert max(regrets) <= 0.03
+
+
+@pytest.mark.slow
+def test_the_map_of_plans_is_that_of_the_records() -> None:
+    assert MAP.read_text("utf-8") == fill_map()

@@ -5,8 +5,10 @@ from __future__ import annotations
 from pathlib import Path
 from typing import Any
 
+import pytest
 import yaml
 
+from sandmould.kinds.sand.fill_map import best_by_records
 from sandmould.study.plan.expand import expand
 from sandmould.study.plan.load_study import open_study
 from sandmould.study.plan.plan_files import plan_table
@@ -31,9 +33,6 @@ def test_the_plan_lists_what_the_table_must_do(tmp_path: Path) -> None:
     assert lines[first + 3].split() == ["50", "Hz", "0.149", "mm", "46.8", "mm/s", "1.50", "g"]
     assert "* half of peak to peak" in lines[first + 4]
     assert "Below 1 g the box never throws the sand: expect little." in lines[first + 5]
-    (rule,) = [line for line in lines if line.startswith("Frequency: ")]
-    assert "Expect good filling from about 85 Hz on: 0.25 c/(4 H) at this wave speed." in rule
-    assert rule.endswith("docs/frequency_law.md.")
 
 
 def test_twelve_settings_are_listed_and_the_rest_counted(tmp_path: Path) -> None:
@@ -42,11 +41,51 @@ def test_twelve_settings_are_listed_and_the_rest_counted(tmp_path: Path) -> None
     assert "Below 1 g" not in plan
 
 
-def test_a_sideways_shake_has_no_rule_of_frequency_and_throws_nothing(tmp_path: Path) -> None:
+def test_a_sideways_shake_throws_nothing(tmp_path: Path) -> None:
     sideways = [{"frequency_hz": 50, "acceleration_g": 1.5, "direction": "horizontal"}]
-    plan = plan_of(tmp_path, [0.5, 1.5], vibration=sideways)
-    assert "Frequency: " not in plan
-    assert "Below 1 g" not in plan
+    assert "Below 1 g" not in plan_of(tmp_path, [0.5, 1.5], vibration=sideways)
+
+
+def foretold(folder: Path, hold: str, values: list[float], **scenario: Any) -> str:
+    """What records say of the shipped tube over frequency."""
+    amplitude = {
+        "acceleration": {"acceleration_g": 1.5},
+        "displacement": {"displacement_m": 1.5e-4},
+    }
+    stage = {"frequency_hz": 50, "duration_s": 1, "hold": hold, **amplitude[hold]}
+    study = {
+        "based_on": "tube", "scenario": {"vibration": [stage], **scenario},
+        "sweep": {"keys": {"vibration.0.frequency_hz": values}},
+    }  # fmt: skip
+    path = folder / "trial.yaml"
+    path.write_text(yaml.safe_dump(study), encoding="utf-8")
+    return best_by_records([run.scenario for run in expand(open_study(path))])
+
+
+def test_what_the_table_keeps_decides_which_frequency_is_foretold(tmp_path: Path) -> None:
+    # c/(4 H) is 350 Hz: at 1.5 g the top lies near a quarter of it, or at the lowest frequency.
+    assert "tube 85 Hz should fill it best" in foretold(tmp_path, "acceleration", [25, 42, 85, 150])
+    assert "150 Hz should fill" in foretold(tmp_path, "displacement", [50, 85, 150])
+    hard = {"wave_speed_m_s": 256}
+    assert "16 Hz should" in foretold(tmp_path, "acceleration", [16, 60, 120], contact=hard)
+
+
+WIDE = {"kind": "tube", "name": "tube", "diameter_m": 0.05, "length_m": 0.05, "left_end_x_m": 0.07,
+        "wall_thickness_m": 0.003, "axis_height_m": 0.035, "closed_end": "right"}  # fmt: skip
+
+
+@pytest.mark.parametrize(
+    "beyond",
+    [
+        {"contact": {"wave_speed_m_s": 400}},
+        {"fill": {"layers": [{"height_m": 0.1, "repeat": 5}]}, "box": {"height_m": 0.6}},
+        {"obstacles": [WIDE]},
+    ],
+)
+def test_records_foretell_nothing_beyond_their_range(tmp_path: Path, beyond: Any) -> None:
+    assert foretold(tmp_path, "acceleration", [42, 85]) != ""
+    assert foretold(tmp_path, "acceleration", [42, 85], **beyond) == ""
+    assert foretold(tmp_path, "acceleration", [1000, 2000]) == ""
 
 
 def test_a_space_narrower_than_five_grains_is_told_with_its_numbers(tmp_path: Path) -> None:

@@ -1,0 +1,89 @@
+"""Which of a study's frequencies should fill a tube best, by the fitted map of our records.
+
+The fill goes with the velocity of the table and with the frequency over c/(4 H), so what stays
+constant when the frequency changes decides (docs/frequency_law.md). The map says nothing beyond the
+range of the records that it was fitted to.
+"""
+
+from __future__ import annotations
+
+import functools
+from collections.abc import Sequence
+from typing import Any
+
+import numpy as np
+import yaml
+from numpy.typing import NDArray
+
+from sandmould import SHIPPED
+from sandmould.runs.formatting import number
+from sandmould.scenario.box import Tube
+from sandmould.scenario.drive import laid_down_drive
+from sandmould.scenario.hardness import Hardness, bed_hardness
+from sandmould.scenario.scenario import Scenario
+
+MAP = SHIPPED / "config" / "fill_map.yaml"
+"""Written by ``python -m benchmarks.frequency_law``."""
+
+
+def best_by_records(scenarios: Sequence[Scenario]) -> str:
+    """Say at which of the settings the tube should fill best.
+
+    Empty unless all of them shake one tube of the records' kind upright, within their range, at
+    frequencies that differ.
+
+    Parameters
+    ----------
+    scenarios : sequence of Scenario
+        One a setting.
+    """
+    fills = {_frequency_hz(scenario): _foretold(scenario) for scenario in scenarios}
+    if len(fills) < max(2, len(scenarios)) or not np.isfinite([*fills.values()]).all():
+        return ""
+    best = number(max(fills, key=lambda hz: fills[hz]))
+    return (
+        f"By our records of such a tube {best} Hz should fill it best of these. They foretell its "
+        f"fill to {_map()['error']:.2f} (docs/frequency_law.md)."
+    )
+
+
+def _frequency_hz(scenario: Scenario) -> float:
+    return laid_down_drive(scenario.vibrations[0]).frequency_hz if scenario.vibrations else 0.0
+
+
+def _foretold(scenario: Scenario) -> float:
+    """Fill of the tube of the records at a setting; NaN where they do not tell it."""
+    tubes = [obstacle for obstacle in scenario.obstacles if isinstance(obstacle, Tube)]
+    hardness = bed_hardness(scenario)
+    if len(tubes) != 1 or len(scenario.vibrations) != 1 or hardness is None:
+        return np.nan
+    (stage,) = scenario.vibrations
+    if stage.unit_direction(scenario.dimension)[-1] < 1.0 or not _in_range(tubes[0], hardness):
+        return np.nan
+    drive = laid_down_drive(stage)
+    return _at(drive.velocity_m_s, drive.frequency_hz / hardness.column_hz)
+
+
+def _in_range(tube: Tube, hardness: Hardness) -> bool:
+    asked = {
+        "tube_width_m": tube.diameter_m,
+        "bed_depth_m": hardness.depth_m,
+        "wave_speed_m_s": hardness.wave_speed_m_s,
+    }
+    return all(low <= asked[name] <= high for name, (low, high) in _map()["range"].items())
+
+
+def _at(velocity_m_s: float, in_modes: float) -> float:
+    """Fill between the points of the map, along the logarithms; NaN beyond them."""
+    from scipy.interpolate import RegularGridInterpolator
+
+    points = [np.log(_map()[axis]) for axis in ("velocity_m_s", "in_modes")]
+    fill: NDArray[np.float64] = np.array(_map()["fill"], dtype=np.float64)
+    between = RegularGridInterpolator(points, fill, bounds_error=False)
+    return float(between(np.log([[velocity_m_s, in_modes]]))[0])
+
+
+@functools.cache
+def _map() -> dict[str, Any]:
+    loaded: dict[str, Any] = yaml.safe_load(MAP.read_text(encoding="utf-8"))
+    return loaded
