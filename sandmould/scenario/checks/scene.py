@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterator
 
 import numpy as np
@@ -342,8 +343,8 @@ def _fill(s: Scenario) -> Iterator[Problem]:
             valid = valid if s.fill.spout is not None else "a layer of at least one grain"
             yield Problem("fill.layers", f"layer {portion_of(s, i + 1)[0]}", valid)
             return
-    if too_many := [*GRAINS.problems("fill.layers", sum(counts))]:
-        yield from too_many
+    if (number := sum(counts)) > GRAINS.most:
+        yield from _too_many_grains(s, number)
         return
     yield from _time_of_layers(s, counts)
     height = predicted_bed_height_m(s, counts)
@@ -362,6 +363,19 @@ def _fill(s: Scenario) -> Iterator[Problem]:
             f"a bed about {height:.4g} m high",
             f"layers that fit into box.height_m, {s.box.height_m:g} m",
         )
+
+
+def _too_many_grains(s: Scenario, number: int) -> Iterator[Problem]:
+    """Say from which size on the grains of a flask can be computed."""
+    if any(layer.height_m is None for layer in s.fill.layers):
+        yield from GRAINS.problems("fill.layers", number)
+        return
+    scale = s.sand.size_scale * (number / GRAINS.most) ** (1 / s.dimension)
+    least = math.ceil(10 * scale * (1 - 1e-9)) / 10
+    valid = (
+        f"at least {least:g} here: the layers hold {number:,} grains, of at most {GRAINS.most:,}"
+    )
+    yield Problem("sand.size_scale", s.sand.size_scale, valid)
 
 
 def _time_of_layers(s: Scenario, counts: list[int]) -> Iterator[Problem]:

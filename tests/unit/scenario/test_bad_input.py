@@ -168,6 +168,11 @@ CASES: dict[str, tuple[str, str]] = {
         "valid is at most 20,000,000 grains: fewer or thinner layers, or a larger "
         "sand.size_scale.",
     ),
+    "flask with grains of their own size": (
+        "based_on: tube_3d\nscenario: {sand: {size_scale: 0.2}, engine: {name: reference}}",
+        "trial.yaml: scenario.sand.size_scale = 0.2 cannot be used: valid is at least 0.6 here: "
+        "the layers hold 459,521,448 of at most 20,000,000 grains.",
+    ),
     "gate that is not there": (
         "based_on: hopper\nscenario: {discharge: {gate: sluice}}",
         "trial.yaml: scenario.discharge.gate = 'sluice' cannot be used: valid is a plate among "
