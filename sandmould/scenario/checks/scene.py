@@ -372,9 +372,7 @@ def _too_many_grains(s: Scenario, number: int) -> Iterator[Problem]:
         return
     scale = s.sand.size_scale * (number / GRAINS.most) ** (1 / s.dimension)
     least = math.ceil(10 * scale * (1 - 1e-9)) / 10
-    valid = (
-        f"at least {least:g} here: the layers hold {number:,} grains, of at most {GRAINS.most:,}"
-    )
+    valid = f"at least {least:g} here: the layers hold {number:,} of at most {GRAINS.most:,} grains"
     yield Problem("sand.size_scale", s.sand.size_scale, valid)
 
 
