@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from functools import lru_cache
+from weakref import WeakKeyDictionary
 
 import numpy as np
 from scipy.ndimage import label
@@ -17,9 +17,11 @@ _DRAWN = 50_000
 """Places in the box round the cavity: a share of 0.95 comes out to 0.001."""
 _RADII = 4
 """Of balls that cover what a grain reaches: from its own down to what the grid tells of it."""
+_KNOWN: WeakKeyDictionary[Cavity, dict[float, float]] = WeakKeyDictionary()
+"""What was found of each cavity, which belongs to one scene, by the grain: asked at every moment.
+"""
 
 
-@lru_cache(maxsize=64)
 def reached_share(cavity: Cavity, scene: Scene, grain_m: float) -> float:
     """Share of a cavity that grains of one size can cover, coming in through its mouth.
 
@@ -34,6 +36,13 @@ def reached_share(cavity: Cavity, scene: Scene, grain_m: float) -> float:
     grain_m : float, m
         Diameter of the grain.
     """
+    known = _KNOWN.setdefault(cavity, {})
+    if grain_m not in known:
+        known[grain_m] = _reached_share(cavity, scene, grain_m)
+    return known[grain_m]
+
+
+def _reached_share(cavity: Cavity, scene: Scene, grain_m: float) -> float:
     dimension = scene.dimension
     grid = cavity_grid(cavity, grain_m / CELLS_A_GRAIN[dimension], _MOST_PLACES, margin_m=grain_m)
     places_m = grid.points_m.reshape(-1, dimension)

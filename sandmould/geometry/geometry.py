@@ -202,7 +202,7 @@ def distance_within(surface: Wall | Solid, position_m: Array, reach_m: float) ->
     return surface.distance_m(position_m)
 
 
-@dataclass(frozen=True, eq=False)
+@dataclass(frozen=True)
 class Scene:
     """All that the sand can touch, and the cavities it should fill."""
 
