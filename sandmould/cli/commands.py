@@ -122,14 +122,23 @@ def run(
             "--cluster", help="Submit the runs to Slurm; ./cluster.yaml says to which partition."
         ),
     ] = False,
+    detach: Annotated[
+        bool,
+        typer.Option("--detach", help="The same by a small job, so that you can log out."),
+    ] = False,
 ) -> None:
     """Compute a study, or what is missing of it; write its report."""
     from sandmould.execution.run_study import run_study
 
     if adopt:
         _adopt(study)
-    profile = ["--workflow-profile", "slurm"] if cluster else []
-    raise typer.Exit(run_study(study, [*_cores_option(cores), *profile, *(options or [])]))
+    profile = ["--workflow-profile", "slurm"] if cluster or detach else []
+    given = [*_cores_option(cores), *profile, *(options or [])]
+    if not detach:
+        raise typer.Exit(run_study(study, given))
+    from sandmould.execution.cluster.driver import submit_driver
+
+    typer.echo(submit_driver(study, given))
 
 
 @app.command(epilog="Example: sandmould demo --quick")
@@ -339,7 +348,7 @@ def report(study: StudyFile) -> None:
     page = folder / "report.html"
     try:
         write_report(folder, page)
-    except (OSError, ValueError) as error:
+    except ValueError as error:
         valid = f"a folder of results that can be read ({error})"
         raise BadInputError([Problem("results", str(folder), valid)]) from error
     typer.echo(last_line(folder))

@@ -178,7 +178,15 @@ def _simulate(folder: Path, ranks: int, mpi: str, run: Run | None = None) -> int
             status = _in_ranks(folder, ranks, mpi, lock)
         else:
             run, before = run or read_run(folder / "scenario.yaml"), loaded()
-            status = simulate(folder, run)
+            try:
+                status = simulate(folder, run)
+            except OSError as error:
+                from sandmould.engines.driver import DISK_ERRORS  # slow to import
+
+                if error.errno not in DISK_ERRORS:
+                    raise
+                print(f"{run.run}: the disk refused. {error}", file=sys.stderr)
+                return RESTARTABLE_EXIT
             keep_loaded(run.scenario, before)
         return ASKED_EXIT if status == RESTARTABLE_EXIT and is_asked() else status
 

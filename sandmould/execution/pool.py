@@ -7,6 +7,7 @@ crashes or is killed takes no other with it. MPI, engines and threads begin in t
 from __future__ import annotations
 
 import collections
+import contextlib
 import multiprocessing
 import os
 import signal
@@ -18,8 +19,10 @@ from multiprocessing.connection import Connection
 from pathlib import Path
 from typing import Any, NamedTuple
 
+from sandmould.execution.spent import note_spent
 from sandmould.module_main import in_a_sentence
 from sandmould.runs.parent import call_process, end_with_parent, print_to
+from sandmould.runs.products import cpu_time_s
 
 LOADED_FIRST = "SANDMOULD_LOADED_FIRST"
 """Variable of the environment: scenarios of runs whose libraries the server loads."""
@@ -79,7 +82,8 @@ def do(work: Callable[..., int | None], *given: Any, log: Path, name: str = "") 
     start_server()
     reader, writer = _CONTEXT.Pipe(duplex=False)
     with _ONE_AT_A_TIME:
-        begin = (writer, os.getcwd(), dict(os.environ), work, given)
+        study_folder = log.absolute().parent.parent
+        begin = (writer, os.getcwd(), dict(os.environ), study_folder, work, given)
         process = _CONTEXT.Process(target=_begin, args=begin, daemon=True)
         process.start()
     writer.close()
@@ -87,11 +91,12 @@ def do(work: Callable[..., int | None], *given: Any, log: Path, name: str = "") 
     with (
         reader,
         open(reader.fileno(), encoding="utf-8", errors="replace", closefd=False) as lines,
-        log.open("a", encoding="utf-8") as log_file,
+        log.open("ab", buffering=0) as log_file,
     ):
         for line in lines:
-            log_file.write(line if line.startswith(name) or not line.strip() else f"{name}: {line}")
-            log_file.flush()
+            said = line if line.startswith(name) or not line.strip() else f"{name}: {line}"
+            with contextlib.suppress(OSError):  # of a full disk the work's own words tell
+                log_file.write(said.encode())
             sys.stderr.write(line)
             sys.stderr.flush()
             if line.strip():
@@ -107,6 +112,7 @@ def _begin(
     writer: Connection,
     folder: str,
     environment: dict[str, str],
+    study_folder: Path,
     work: Callable[..., int | None],
     given: tuple[Any, ...],
 ) -> None:
@@ -121,7 +127,10 @@ def _begin(
     os.environ.clear()
     os.environ.update(environment)
     os.chdir(folder)
-    raise SystemExit(in_a_sentence(work, *given))
+    try:
+        raise SystemExit(in_a_sentence(work, *given))
+    finally:
+        note_spent(study_folder, cpu_time_s())
 
 
 def _end_with_asker() -> None:

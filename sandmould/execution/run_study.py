@@ -10,6 +10,7 @@ from __future__ import annotations
 import os
 import re
 import sys
+import time
 from collections.abc import Sequence
 from functools import partial
 from pathlib import Path
@@ -17,11 +18,14 @@ from pathlib import Path
 import sandmould.runs.one_blas_thread  # noqa: F401
 from sandmould import SHIPPED
 from sandmould.bad_input import BAD_INPUT_EXIT
-from sandmould.execution.cluster.settings import may_be_elsewhere
+from sandmould.execution.cluster.driver import replace_driver
+from sandmould.execution.cluster.queue import end_jobs, jobs_of
+from sandmould.execution.cluster.settings import goes_to_slurm, may_be_elsewhere
 from sandmould.execution.locks import let_go
 from sandmould.execution.screen.ending import last_line, trouble
 from sandmould.execution.screen.screen import Screen
-from sandmould.execution.stopping import run_in_group, until_stopped
+from sandmould.execution.spent import note_spent
+from sandmould.execution.stopping import Stopped, run_in_group, until_stopped
 from sandmould.study.plan.build_plan import RESULTS, Plan, checked_plan, starts_jobs, writing
 from sandmould.study.plan.plan_files import SUMMARY
 
@@ -49,11 +53,16 @@ def run_study(path: Path, options: Sequence[str], opening: str = "") -> int:
     BadInputError
         Before anything starts.
     """
-    return until_stopped(partial(_run_study, path, options, opening), path.stem)
+    try:
+        return until_stopped(partial(_run_study, path, options, opening), path.stem)
+    finally:
+        note_spent(RESULTS / path.stem, time.process_time())
 
 
 def _run_study(path: Path, options: Sequence[str], opening: str) -> int:
     plan = checked_plan(path)
+    if starts_jobs(options):
+        replace_driver(plan.study.name)
     folder, study = RESULTS / plan.study.name, plan.study.study
     while study.refine.rounds or study.certificate.controls:
         if _snakemake(plan, options, [str(folder / SUMMARY)]):
@@ -80,26 +89,35 @@ def _snakemake(plan: Plan, options: Sequence[str], targets: Sequence[str]) -> in
     workflow = ["--snakefile", str(SHIPPED / "Snakefile"), "--configfile", file]
     arguments = [*cores, *workflow, *options]
     arguments += ["--", *targets] if targets else []
-    work = partial(_be_snakemake, arguments)
+    folder = RESULTS / plan.study.name
+    work = partial(_be_snakemake, arguments, folder)
     if not starts_jobs(options):
         return run_in_group(work)
-    with writing(RESULTS / plan.study.name):
-        screen = Screen(plan, RESULTS, stated or _all_cores())
+    with writing(folder):
+        submits = goes_to_slurm(options)
+        screen = Screen(plan, RESULTS, stated or _all_cores(), submits=submits)
         log = screen.log.open("w", encoding="utf-8")
     with log:
+        names = [run.run for run in (*plan.fills, *plan.runs)]
+        earlier = jobs_of(names) if submits else []
         with screen:
-            elsewhere = may_be_elsewhere(options)
-            status = run_in_group(work, log, screen.environment(), screen.look, elsewhere)
+            # Snakemake would cancel its jobs, too, but take half a minute.
+            asked_first = may_be_elsewhere(options) and not submits
+            try:
+                status = run_in_group(work, log, screen.environment(), screen.look, asked_first)
+            except Stopped as end:
+                if submits:
+                    end.said = end_jobs(jobs_of(names), earlier)
+                raise
         if status == BAD_INPUT_EXIT:
             return status
         screen.tell_failures()
-        if status and not screen.is_explained and (found := trouble(screen.log)):
-            stopped = f'The study stopped outside its runs. Snakemake told "{"; ".join(found)}".'
-            print(f"{stopped} All that it said: {screen.log}", file=sys.stderr)
+        if status and not screen.is_explained and (said := trouble(folder, screen.log)):
+            print(said, file=sys.stderr)
     return status
 
 
-def _be_snakemake(arguments: Sequence[str]) -> None:
+def _be_snakemake(arguments: Sequence[str], folder: Path) -> None:
     """Do what ``python -m snakemake`` does, in this process, which has the plan."""
     from snakemake.cli import main
 
@@ -107,6 +125,7 @@ def _be_snakemake(arguments: Sequence[str]) -> None:
     try:
         main()
     finally:
+        note_spent(folder, time.process_time())
         let_go()
 
 

@@ -12,8 +12,17 @@ from typing import Any, Literal
 
 from sandmould.bad_input import BadInputError
 from sandmould.definition.run import Run
-from sandmould.execution.cluster.queue import jobs_of, live_jobs, queue_lines
+from sandmould.execution.cluster.driver import driver_lines
+from sandmould.execution.cluster.queue import (
+    Job,
+    Outlook,
+    jobs_of,
+    live_jobs,
+    outlook,
+    queue_lines,
+)
 from sandmould.execution.locks import is_locked
+from sandmould.execution.spent import noted_s
 from sandmould.execution.tidy import freed_bytes, orphans
 from sandmould.execution.time_left import TimeLeft
 from sandmould.plain_file import UNREADABLE, read_json
@@ -154,10 +163,14 @@ def status_text(plan: Plan, results: Path, cores: int, deep: bool = False) -> st
     lines = [f"{plan.study.name}: {_count(plan.runs, statuses)} of {len(plan.runs)} runs"]
     if any(statuses[fill.run].state != "done" for fill in fills):
         lines.append(f"{_count(fills, statuses)} of {len(fills)} fills that runs share")
-    spent_s = sum(status.cpu_s for status in statuses.values())
-    lines.append(f"processor time so far: {duration_text(spent_s)}; {_left(plan, statuses, cores)}")
+    # Processes that were killed wrote nothing down, nor did those of older versions.
+    now_s = sum(status.cpu_s for status in statuses.values() if status.state == "running")
+    spent_s = max(noted_s(folder) + now_s, sum(status.cpu_s for status in statuses.values()))
+    jobs = [] if live is None else jobs_of(statuses)
+    left = _left(plan, statuses, cores, jobs)
+    lines.append(f"processor time so far: {duration_text(spent_s)}; {left}")
     if live is not None:
-        lines += queue_lines(jobs_of(statuses, Path()))
+        lines += [*driver_lines(plan.study.name), *queue_lines(jobs)]
     log = read_rounds(folder, plan.study.study)
     if plan.study.study.refine.rounds:
         ended = log.ended or f"of at most {plan.study.study.refine.rounds}"
@@ -224,18 +237,23 @@ def _orphans(plan: Plan, results: Path) -> list[str]:
     return lines + ([f"  and {len(found) - LISTED_RUNS} more"] if len(found) > LISTED_RUNS else [])
 
 
-def _left(plan: Plan, statuses: Mapping[str, RunStatus], cores: int) -> str:
-    """Wall time until the report is written."""
+def _left(plan: Plan, statuses: Mapping[str, RunStatus], cores: int, jobs: Sequence[Job]) -> str:
+    """Wall time until the report is written, on the cores of its jobs where there are any."""
     time_left = TimeLeft((*plan.fills, *plan.runs), stored_speeds(plan))
     for status in statuses.values():
         time_left.learn(status.run, status.wall_s)
     begun = {s.run: s.share for s in statuses.values() if s.state in ("running", "stopped")}
     waiting = [s.run for s in statuses.values() if s.state == "waiting"]
-    left_s = time_left.seconds(begun, waiting, cores)
+    ahead = Outlook(cores)
+    if any(job.lives for job in jobs):
+        computes = any(status.state == "running" for status in statuses.values())
+        ahead = outlook(jobs, computes, cores)
+    left_s = time_left.seconds(begun, waiting, ahead.cores)
     if not left_s:
         return "nothing left"
     left = [run for run in (*plan.fills, *plan.runs) if run.run in {*begun, *waiting}]
+    where = f"{ahead.cores} cores {ahead.awaits}".strip()
     return (
-        f"time left, report included: about {duration_text(left_s)} on {cores} cores, "
+        f"time left, report included: about {duration_text(left_s + ahead.begins_s)} on {where}, "
         f"{time_left.prices.basis(left)}"
     )

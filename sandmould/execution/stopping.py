@@ -5,11 +5,14 @@ from __future__ import annotations
 import contextlib
 import multiprocessing
 import os
+import shutil
 import signal
+import socket
 import sys
 import tempfile
 from collections.abc import Callable, Iterator, Mapping
 from functools import partial
+from pathlib import Path
 from types import FrameType, ModuleType
 from typing import IO
 
@@ -26,6 +29,8 @@ class Stopped(BaseException):
     def __init__(self, number: int) -> None:
         self.status = 128 + number
         """Exit status, as a shell gives it."""
+        self.said = ""
+        """What goes on nevertheless."""
         super().__init__(number)
 
 
@@ -49,6 +54,8 @@ def until_stopped(work: Callable[[], int], name: str) -> int:
             return work()
     except Stopped as stopped:
         print(f"\n{name} was stopped: the same command goes on with it.", file=sys.stderr)
+        if stopped.said:
+            print(stopped.said, file=sys.stderr)
         return stopped.status
 
 
@@ -106,8 +113,12 @@ def run_in_group(
     Stopped
         When a signal asked to end, after all processes ended.
     """
-    # Its temporary files end with it, however it ends.
-    with tempfile.TemporaryDirectory(prefix="sandmould-") as temporary:
+    # Its temporary files end with it, or with the next command where this one is killed.
+    ours = f"sandmould-{socket.gethostname()}-"
+    for left in Path(tempfile.gettempdir()).glob(f"{ours}*-*"):
+        if sys.platform == "linux" and not Path("/proc", left.name.split("-")[-2]).exists():
+            shutil.rmtree(left, ignore_errors=True)
+    with tempfile.TemporaryDirectory(prefix=f"{ours}{os.getpid()}-") as temporary:
         begin = partial(_begin, work, log, environment or {}, temporary)
         process = multiprocessing.get_context("fork").Process(target=begin)
         before = signal.pthread_sigmask(signal.SIG_BLOCK, END_SIGNALS)

@@ -14,10 +14,14 @@ from pathlib import Path
 def replaced(path: Path) -> Iterator[Path]:
     """Give a temporary name beside a file's own; what is there at the end takes its place.
 
-    After an error the file stays as it was.
+    After an error the file stays as it was; that of a full disk is told its name.
     """
     partial = path.with_name(f"{path.name}.partial")
-    yield partial
+    try:
+        yield partial
+    except OSError as error:
+        error.filename = error.filename or str(path)
+        raise
     os.replace(partial, path)
 
 

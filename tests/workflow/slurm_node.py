@@ -19,7 +19,7 @@ SlurmdPort={ports[1]}
 SlurmUser={user}
 SlurmdUser={user}
 AuthType=auth/munge
-AuthInfo=socket={folder}/munge/socket
+AuthInfo=socket={folder}/munge/socket,cred_expire=10
 CredType=cred/munge
 StateSaveLocation={folder}/state
 SlurmdSpoolDir={folder}/spool
@@ -72,14 +72,17 @@ class SlurmNode:
                 memory_mb=os.sysconf("SC_PAGE_SIZE") * os.sysconf("SC_PHYS_PAGES") // 2**21,
             )
         )
-        # Snakemake's jobs hide SLURM_CONF from srun, which then looks at the cluster's usual place.
-        srun = folder / "bin" / "srun"
-        srun.parent.mkdir()
-        srun.write_text(f'#!/bin/sh\nSLURM_CONF={conf} exec {shutil.which("srun")} "$@"\n')
-        srun.chmod(0o755)
+        # Snakemake's jobs hide SLURM_CONF from these, which then look at the cluster's usual place.
+        programs = folder / "bin"
+        programs.mkdir()
+        for name in ("srun", "sbatch", "squeue", "scancel"):
+            (programs / name).write_text(
+                f'#!/bin/sh\nSLURM_CONF={conf} exec {shutil.which(name)} "$@"\n'
+            )
+            (programs / name).chmod(0o755)
         self.environment = os.environ | {
             "SLURM_CONF": str(conf),
-            "PATH": f"{srun.parent}:{os.environ['PATH']}:/usr/sbin",
+            "PATH": f"{programs}:{os.environ['PATH']}:/usr/sbin",
         }
 
     def start(self) -> None:
@@ -114,6 +117,11 @@ class SlurmNode:
     def submit(self, *options: str) -> str:
         """Submit a job that does nothing; gives its number."""
         return self._run("sbatch", "--parsable", *options, "--wrap=true").strip()
+
+    def take_jobs(self, state: str) -> None:
+        """Let the node begin jobs (``resume``) or not (``drain``)."""
+        node = self._run("sinfo", "-h", "-o", "%n").strip()
+        self._run("scontrol", "update", f"nodename={node}", f"state={state}", "reason=test")
 
     def requeue(self, job: str) -> None:
         """End a job and put it into the queue again, as after the loss of its node."""

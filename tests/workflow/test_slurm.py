@@ -16,6 +16,7 @@ import pytest
 
 from sandmould.execution.pool import PROCESS_NAME
 from sandmould.runs.run_tables import read_costs
+from sandmould.study.plan.build_plan import open_plan
 from tests.workflow.slurm_node import SlurmNode, missing
 
 pytestmark = pytest.mark.skipif(bool(missing()), reason=f"needs Debian's slurmd: {missing()}")
@@ -27,7 +28,7 @@ scenario:
   time_step: {fraction: 0.8}
   vibration: [{frequency_hz: 50, acceleration_g: 1.5, duration_s: 1.0}]
   record: {snapshot_every_s: 0.1}
-sweep: {keys: {vibration.0.frequency_hz: [25, 50, 100]}}
+sweep: {keys: {vibration.0.frequency_hz: [50, 100]}}
 replicates: 2
 """
 RANKS = """\
@@ -86,7 +87,7 @@ def study_folder(folder: Path, study: str) -> Path:
 
 
 # Two or so runs share a job, and the queue of an empty node is asked more often.
-SANDMOULD = [sys.executable, "-m", "sandmould.cli"]
+SANDMOULD = [sys.executable, "-P", str(Path(__file__).with_name("quick_queue.py"))]
 COMMAND = [
     *SANDMOULD, "run", "small.yaml", "--cluster", "--", "--config", "batch_wall_s=8",
     "--slurm-init-seconds-before-status-checks", "1", "--latency-wait", "5",
@@ -118,23 +119,21 @@ def call(slurm: SlurmNode, folder: Path, *command: str) -> subprocess.CompletedP
 
 @pytest.mark.slow
 def test_without_shared_jobs_each_asks_what_the_partition_gives(
-    slurm: SlurmNode, tmp_path: Path
+    slurm: SlurmNode, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    two = STUDY.replace("[25, 50, 100]", "[25, 50]").replace("replicates: 2", "replicates: 1")
-    folder, log = study_folder(tmp_path / "study", two), tmp_path / "log"
+    folder, log = study_folder(tmp_path / "study", STUDY), tmp_path / "log"
+    monkeypatch.chdir(folder)
+    run = open_plan(Path("small.yaml")).runs[0]
     alone = [each.replace("batch_wall_s=8", "batch_wall_s=0") for each in COMMAND]
-    process = start(slurm, folder, log, alone)
+    measures = f"results/small/{run.place}/measures.tsv"
+    process = start(slurm, folder, log, [*alone, "--retries", "0", measures])
     told: dict[str, str] = {}
     while process.poll() is None:
         told |= slurm.told("%P %l %k")
         time.sleep(0.2)
     assert process.returncode == 0, log.read_text()
-    small = folder / "results" / "small"
-    runs, fills = ([path.name for path in (small / place).iterdir()] for place in ("runs", "fills"))
-    jobs = [f"fill_wildcards_{fill}" for fill in fills]
-    jobs += [
-        f"{rule}_wildcards_{run}" for rule in ("render", "simulate", "measure") for run in runs
-    ]
+    jobs = [f"{rule}_wildcards_{run.run}" for rule in ("render", "simulate", "measure")]
+    jobs.append(f"fill_wildcards_{run.fill}")
     assert sorted(told.values()) == sorted(f"short 5:00 rule_{job}" for job in jobs)
 
 
@@ -150,9 +149,6 @@ def test_a_run_of_two_ranks_gets_two_cores_and_the_time_that_its_partition_allow
         "cluster.yaml: partition = 'shrot' cannot be used: valid is a partition of this cluster: "
         "main, short.\n"
     )
-    # On the command line as well.
-    (folder / "cluster.yaml").unlink()
-    assert call(slurm, folder, *COMMAND, "slurm_partition=shrot").stderr == said
     (folder / "cluster.yaml").write_text("partition: short\n")
     process = start(slurm, folder, log)
     wait_for(lambda: bool(slurm.jobs()), process, log)
@@ -191,6 +187,26 @@ def test_a_run_of_two_ranks_gets_two_cores_and_the_time_that_its_partition_allow
     runs = list((folder / "results" / "small" / "runs").iterdir())
     assert read_costs(runs).rows["ranks"].tolist() == [2]
 
+    # The command as a job of its own, after which no other begins.
+    slurm.take_jobs("drain")
+    submitted = call(slurm, folder, *[c.replace("--cluster", "--detach") for c in COMMAND])
+    (job,) = slurm.jobs()
+    assert submitted.stdout.startswith(f"The command is job {job} of the cluster: ")
+    again = call(slurm, folder, *COMMAND)
+    assert again.returncode == 1
+    ends = f"computes small already: scancel {job} ends it.\n"
+    assert again.stderr == f"job {job} of the cluster (pending) {ends}"
+    said = call(slurm, folder, *SANDMOULD, "status", "small.yaml").stdout
+    assert f"\nthe command is job {job}, pending (" in said
+    slurm.take_jobs("resume")
+    deadline = time.monotonic() + LIMIT_S
+    while slurm.jobs():
+        assert time.monotonic() < deadline, said
+        time.sleep(0.2)
+    said = call(slurm, folder, *SANDMOULD, "status", "small.yaml").stdout
+    assert "the command was a job, which has ended: " in said
+    assert "small/report.html (results/small/logs/driver.log)\n" in said
+
 
 @pytest.mark.slow
 def test_cancelled_jobs_killed_processes_and_a_killed_snakemake_cost_no_finished_run(
@@ -214,7 +230,7 @@ def test_cancelled_jobs_killed_processes_and_a_killed_snakemake_cost_no_finished
     os.killpg(process.pid, signal.SIGKILL)
     process.wait()
     left, finished = slurm.jobs(), done()
-    assert len(finished) < 6
+    assert len(finished) < 4
 
     # Jobs of the first start go on; those of the second wait for them in the queue.
     process = start(slurm, folder, tmp_path / "second.log")
@@ -231,12 +247,12 @@ def test_cancelled_jobs_killed_processes_and_a_killed_snakemake_cost_no_finished
     assert "Jobs of an earlier start go on: " in said
     assert all(job in said.split("go on: ")[1].split(".")[0] for job in left)
     summary = pd.read_csv(folder / "results" / "small" / "summary.tsv", sep="\t")
-    assert list(summary.outcome) == ["finished"] * 6
+    assert list(summary.outcome) == ["finished"] * 4
     assert summary.tube_fill_fraction.notna().all()
     assert {run: time_ns for run, time_ns in done().items() if run in finished} == finished
     # No job and no process is left behind.
     assert slurm.jobs() == {}
     assert simulating(folder) == []
-    # Six runs in no more than a handful of jobs.
-    assert len(list((folder / "results" / "small" / "batches").iterdir())) <= 4
+    # Four runs and their fills in three jobs.
+    assert len(list((folder / "results" / "small" / "batches").iterdir())) <= 3
     shutil.rmtree(folder / "results")

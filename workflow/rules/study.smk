@@ -1,7 +1,9 @@
 # The study is validated and expanded before Snakemake builds its graph: bad input ends here, in
 # one sentence a problem.
+import atexit
 import os
 import sys
+import time
 
 from sandmould import SHIPPED
 from sandmould.runs.columns import SWEEP
@@ -13,6 +15,7 @@ from sandmould.execution import jobs
 from sandmould.execution.locks import hold_turn
 from sandmould.execution.packs.recorded import take_up
 from sandmould.execution.pool import start_server
+from sandmould.execution.spent import note_spent
 from sandmould.study.plan.batches import alone, read_batches, write_batches
 from sandmould.study.plan.build_plan import (
     RESULTS,
@@ -60,6 +63,8 @@ try:
         )
     else:
         # A job in a process of its own: what shares it was decided by the main one.
+        place = RESULTS.absolute() / PLAN.study.name
+        atexit.register(lambda: note_spent(place, time.process_time()))
         BATCHED = read_batches((*PLAN.fills, *PLAN.runs), RESULTS / PLAN.study.name)
     if submits:
         SUBMISSION.ask(BATCHED)

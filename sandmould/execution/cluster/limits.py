@@ -22,6 +22,12 @@ class Demand(NamedTuple):
     cores_a_rank: int
     memory_mb: int
 
+    def options(self, wall_min: float) -> list[str]:
+        """The same for ``sbatch``, with a wall time that may be infinite."""
+        minutes = max(1, int(wall_min)) if math.isfinite(wall_min) else 0
+        cores = [f"--ntasks={self.ranks}", f"--cpus-per-task={self.cores_a_rank}"]
+        return [f"--time={minutes}", *cores, f"--mem={self.memory_mb}"]
+
 
 class JobLimits(NamedTuple):
     """What every job of a start is allowed."""
@@ -42,7 +48,7 @@ def limits(cluster: Cluster) -> JobLimits:
     BadInputError
         Where Slurm does not answer, or a partition is none of its.
     """
-    said = [line.split() for line in _answer(["sinfo", "-h", "-o", "%P %l %c"]).splitlines()]
+    said = [line.split() for line in answer(["sinfo", "-h", "-o", "%P %l %c"]).splitlines()]
     rows = [row for row in said if len(row) == 3]  # several a partition whose nodes differ
     there = list(dict.fromkeys(row[0].rstrip("*") for row in rows))
     default = {row[0][:-1] for row in rows if row[0].endswith("*")}
@@ -79,21 +85,24 @@ def check_jobs(cluster: Cluster, wall_min: int, demands: Iterable[Demand]) -> No
     different = sorted(set(demands))
     largest = {max(different, key=lambda d: d.memory_mb), max(different)} if different else set()
     for demand in sorted(largest)[:_TRIED]:
-        command = [
-            "sbatch", "--test-only", *cluster.sbatch(), f"--time={max(1, wall_min)}",
-            f"--ntasks={demand.ranks}", f"--cpus-per-task={demand.cores_a_rank}",
-            f"--mem={demand.memory_mb}", "--wrap=true",
-        ]  # fmt: skip
-        _answer(command, f"{demand.ranks * demand.cores_a_rank} cores, {demand.memory_mb} MB")
+        asked = [*cluster.sbatch(), *demand.options(wall_min)]
+        cores = f"{demand.ranks * demand.cores_a_rank} cores, as batch_cores of the profile allows"
+        said_of = f"a job of {cores}, {demand.memory_mb} MB"
+        answer(["sbatch", "--test-only", *asked, "--wrap=true"], said_of)
 
 
-def _answer(command: Sequence[str], asked: str = "") -> str:
-    """What a program of Slurm says; its refusal becomes one sentence."""
+def answer(command: Sequence[str], asked: str = "") -> str:
+    """What a program of Slurm says; its refusal of what is asked becomes one sentence.
+
+    Raises
+    ------
+    BadInputError
+    """
     try:
         ran = subprocess.run(command, capture_output=True, text=True, timeout=_LIMIT_S, check=False)
     except (OSError, subprocess.TimeoutExpired) as error:
         valid = f"a machine from which Slurm answers, since {command[0]} does not ({error})"
-        raise BadInputError([Problem("--workflow-profile", "slurm", valid)]) from None
+        raise BadInputError([Problem("--cluster", "Slurm", valid)]) from None
     if ran.returncode == 0:
         return ran.stdout
     lines = [line.split("error: ")[-1].strip() for line in ran.stderr.splitlines()]
@@ -101,5 +110,5 @@ def _answer(command: Sequence[str], asked: str = "") -> str:
     stated = " ".join([option for option in command[2:] if option.startswith("--")][:-1])
     valid = f"what this cluster takes: {command[0]} says {said!r}"
     if asked:
-        valid += f" of a job of {asked} ({stated}); batch_cores of the profile sets its cores"
+        valid += f" of {asked} ({stated})"
     raise BadInputError([Problem(str(CLUSTER_FILE), "as it is", valid)])

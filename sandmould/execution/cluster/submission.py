@@ -6,7 +6,6 @@ import math
 import re
 import time
 from collections.abc import Mapping, Sequence
-from pathlib import Path
 from typing import Any
 
 from sandmould.execution.cluster.limits import Demand, JobLimits, check_jobs, limits
@@ -85,11 +84,9 @@ class Submission:
                 f"job is planned with {duration_text(60 * planned)}. It may take {number} jobs; "
                 "each goes on from the last checkpoint."
             )
-        jobs_there = jobs_of(names, Path())
+        jobs_there = jobs_of(names)
         cancel([job for job in jobs_there if job.waits_for_ever])
-        self._earlier = [
-            job for job in jobs_there if job.goes or (job.waits and not job.waits_for_ever)
-        ]
+        self._earlier = [job for job in jobs_there if job.lives and not job.waits_for_ever]
         if self._earlier:
             numbers = ", ".join(job.number for job in self._earlier)
             self.said.append(
@@ -125,8 +122,8 @@ class Submission:
     def options(self, run: str) -> str:
         """Other options of ``sbatch`` for the job of a run, or of several by the first's name."""
         if self._earlier and time.monotonic() - self._asked_s > _FRESH_S:
-            there = {job.number for job in jobs_of({j.run for j in self._earlier}, Path())
-                     if job.goes or job.waits}  # fmt: skip
+            jobs = jobs_of({job.run for job in self._earlier})
+            there = {job.number for job in jobs if job.lives}
             self._earlier = [job for job in self._earlier if job.number in there]
             self._asked_s = time.monotonic()
         before = ":".join(job.number for job in self._earlier if job.run == run)

@@ -2,26 +2,51 @@
 
 from __future__ import annotations
 
+import errno
+import os
 import re
+import tempfile
 from pathlib import Path
 
 from sandmould.study.plan.plan_files import REPORT_FILE, VERDICT_FILE
 
 _TROUBLE = re.compile(r"\b(\w*Error|\w*Exception|error)\b|^sbatch|^srun|Killed|refused|denied")
+_REFUSALS = (errno.ENOSPC, errno.EDQUOT, errno.EFBIG, errno.EROFS, errno.EIO, errno.EACCES)
+_REFUSED = re.compile(
+    rf"(?:(\S+): |\[Errno \d+\] )?({'|'.join(map(os.strerror, _REFUSALS))})(?:: '([^']+)')?"
+)
+_TRIAL_BYTES = 2**18
 LISTED_LINES = 6
 
 
-def trouble(log: Path) -> list[str]:
-    """Lines of Snakemake's log that say what went wrong, each once.
+def trouble(folder: Path, log: Path) -> str:
+    """Say why a study stopped outside its runs: a file that was refused, else Snakemake's words.
 
     Parameters
     ----------
+    folder : Path
+        ``results/<study>``.
     log : Path
+        Snakemake's.
     """
-    lines = log.read_text(encoding="utf-8", errors="replace").splitlines() if log.exists() else []
-    words = [line.strip() for line in lines if line.strip()]
+    text = log.read_text(encoding="utf-8", errors="replace") if log.exists() else ""
+    refused = [(after or before, why) for before, why, after in _REFUSED.findall(text)]
+    try:  # a full disk has no room for the log either
+        with tempfile.TemporaryFile(dir=folder, buffering=0) as file:
+            file.write(bytes(_TRIAL_BYTES))
+    except OSError as error:
+        refused.append((str(folder), str(error.strerror)))
+    if refused:
+        name, why = next((each for each in refused if each[0]), (folder, refused[0][1]))
+        return (
+            f"The study stopped, since {name} could not be written: {why}. What is computed stays: "
+            "once that is mended, the same command goes on."
+        )
+    words = [line.strip() for line in text.splitlines() if line.strip()]
     found = list(dict.fromkeys(line for line in words if _TROUBLE.search(line)))
-    return found[:LISTED_LINES] or words[-LISTED_LINES:]
+    told = "; ".join(found[:LISTED_LINES] or words[-LISTED_LINES:])
+    stopped = f'The study stopped outside its runs. Snakemake told "{told}".'
+    return f"{stopped} All that it said: {log}" if told else ""
 
 
 def last_line(folder: Path) -> str:

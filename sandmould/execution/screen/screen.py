@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import os
 import sys
 import time
@@ -12,6 +13,7 @@ from typing import TYPE_CHECKING
 from rich.console import Console
 from rich.live import Live
 
+from sandmould.execution.cluster.queue import Job, Outlook, jobs_of, outlook
 from sandmould.execution.screen.run_watch import Ended, Running, RunWatch, failure, file_time_s
 from sandmould.execution.screen.table import counts_text, study_table, times_text
 from sandmould.execution.screen.view import RunView, StudyView
@@ -28,6 +30,8 @@ LOOK_EVERY_S = 1.0
 SHARE_OF_TIME = 0.02
 """Of a core, that looking may take: at thousands of runs it is done less often."""
 SELDOM_S = 5.0
+ASK_EVERY_S = 30.0
+"""Between two looks at the queue of a cluster."""
 LINE_EVERY_S = 30.0
 """Between two plain lines on the whole study."""
 _TELLING = 20.0
@@ -39,7 +43,14 @@ _NEARLY = 0.95
 class Screen:
     """What a person sees of one start of a study."""
 
-    def __init__(self, plan: Plan, results: Path, cores: int, live: bool | None = None) -> None:
+    def __init__(
+        self,
+        plan: Plan,
+        results: Path,
+        cores: int,
+        live: bool | None = None,
+        submits: bool = False,
+    ) -> None:
         """Look at what is there.
 
         Parameters
@@ -51,6 +62,8 @@ class Screen:
         live : bool, optional
             Whether to draw a table again and again; by default where stderr is a terminal that
             can.
+        submits : bool
+            Whether runs are computed by jobs of Slurm, on its cores.
         """
         self._folder = results / plan.study.name
         logs = self._folder / "logs"
@@ -59,6 +72,9 @@ class Screen:
         """Takes all that Snakemake and its jobs print."""
         self._words = Words(logs / "words.txt")
         self._plan, self._cores = plan, cores
+        self._submits = submits
+        self._jobs: list[Job] = []
+        self._asked_s = -math.inf
         self._live = is_live_terminal() if live is None else live
         self._console = Console(stderr=True, highlight=False, markup=False, emoji=False)
         self._table: Live | None = None
@@ -187,7 +203,9 @@ class Screen:
                 time_left.foresee(run, 100 * taken_s / at.percent)
         shares = {run: self._share(at, passed_s) for run, at in running.items()}
         waiting = [run for run in self._watch.waiting if run not in running]
+        self._cores, begins_s, awaits = self._outlook(bool(running))
         left_s = time_left.seconds(shares, waiting, self._cores)
+        left_s += begins_s if left_s else 0.0
         return StudyView(
             name=self._plan.study.name,
             runs=len(self._plan.runs),
@@ -200,11 +218,22 @@ class Screen:
             filling=len([run for run in running if run in self._fills]),
             passed_s=passed_s,
             left_s=left_s,
+            awaits=awaits,
             share=passed_s / (passed_s + left_s) if passed_s + left_s else 0.0,
             so_far=self._so_far_known().sentence() if self._done or self.failures else "",
             ended=tuple(self._ended),
             failures=tuple(self.failures),
         )
+
+    def _outlook(self, computes: bool) -> Outlook:
+        """What the queue of a cluster lets the study do."""
+        if not self._submits:
+            return Outlook(self._cores)
+        if (now := time.monotonic()) - self._asked_s > ASK_EVERY_S:
+            self._jobs, self._asked_s = jobs_of(self._folders), now
+        if not self._watch.waiting and any(job.lives for job in self._jobs):
+            return Outlook(self._cores, awaits="the end of jobs in the queue")
+        return outlook(self._jobs, computes, self._cores, now - self._asked_s)
 
     def _share(self, at: Running, passed_s: float) -> float:
         """What is done of a run; of one that cannot tell, by the time that it has taken."""

@@ -63,8 +63,8 @@ def counts_text(view: StudyView) -> str:
 
 def times_text(view: StudyView) -> str:
     """What has passed and what is left."""
-    doing = f", {view.now}" if view.now else ""
     left = f"about {duration_text(view.left_s)} left" if view.left_s >= 1.0 else "soon done"
+    doing = f", {view.now}" if view.now else ""
     return f"{duration_text(view.passed_s)} passed, {left}{doing}"
 
 

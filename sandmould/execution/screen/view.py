@@ -41,8 +41,10 @@ class StudyView:
     """Runs of this start that reached their end, the last one last."""
     failures: tuple[Ended, ...]
     """All that failed, the last one last."""
+    awaits: str = ""
+    """What the queue of a cluster has to do first; nobody knows when that is."""
 
     @property
     def now(self) -> str:
-        """What is being done, where no run is left."""
-        return "" if self.running or self.waiting else "tables and report"
+        """What is being done or waited for, where no run is computed."""
+        return self.awaits or ("" if self.running or self.waiting else "tables and report")

@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import os
+import sys
+from datetime import datetime, timedelta
 from pathlib import Path
 from typing import Any
 
@@ -12,8 +14,11 @@ from snakemake.resources import Resources
 
 from sandmould import ROOT
 from sandmould.bad_input import BadInputError
+from sandmould.execution.cluster.driver import replace_driver, submit_driver
 from sandmould.execution.cluster.limits import minutes
+from sandmould.execution.cluster.queue import JOB_START_S, Outlook, end_jobs, jobs_of, outlook
 from sandmould.execution.cluster.submission import Submission, open_submission
+from sandmould.execution.run_study import run_study
 from sandmould.execution.status import status_text
 from sandmould.study.plan.batches import Batch, read_batches, write_batches
 from sandmould.study.plan.build_plan import Plan, open_plan
@@ -49,10 +54,19 @@ class Slurm:
         path = self.folder / f"{program}.calls"
         return path.read_text().splitlines() if path.exists() else []
 
-    def job(self, run: str, number: int, state: str, reason: str, asked: str = "1:00") -> str:
-        """A line of the queue."""
-        comment = f"rule_batch_wildcards_{run}"
-        return f"{number}|{state}|{reason}|0:10|{asked}|node7|sandmould_1|{comment}|{Path.cwd()}\n"
+    def job(
+        self,
+        run: str,
+        number: int,
+        state: str,
+        reason: str,
+        asked: str = "1:00",
+        begins: str = "N/A",
+        comment: str = "rule_batch_wildcards_",
+    ) -> str:
+        """A line of the queue: of a job of 16 cores that was used for 10 s."""
+        told = f"{number}|{state}|{reason}|0:10|{asked}|node7|16|{begins}"
+        return f"{told}|{comment}{run}|sandmould_1|{Path.cwd()}\n"
 
 
 @pytest.fixture
@@ -173,7 +187,10 @@ def test_a_wrong_partition_and_a_refusal_are_one_sentence(slurm: Slurm, plan: Pl
     with pytest.raises(BadInputError) as told:
         submission(plan)
     (said,) = str(told.value).splitlines()
-    assert "sbatch says 'Invalid account or partition specified' of a job of 1 cores, " in said
+    assert (
+        "sbatch says 'Invalid account or partition specified' of a job of 1 cores, as batch_cores "
+        in said
+    )
     assert "(--account=nobody --time=" in said
 
 
@@ -216,6 +233,102 @@ def test_status_tells_what_waits_and_why_and_what_ran_out_of_time(slurm: Slurm, 
         f"{second}",
         "  stop the command, change cluster.yaml (docs/cluster.md), and give it again",
     ]
+
+
+def test_the_time_left_is_that_of_the_jobs(slurm: Slurm, plan: Plan) -> None:
+    first, second = (run.run for run in plan.runs)
+    names = [first, second]
+
+    def told(*lines: str, computes: bool = False, age_s: float = 0.0) -> Outlook:
+        slurm.says("squeue", "".join(lines))
+        return outlook(jobs_of(names), computes, 2, age_s)
+
+    running = [slurm.job(run, 4, "RUNNING", "None") for run in names]
+    assert told(*running, computes=True) == Outlook(32)
+    # A job that begins needs a while, which never stands still.
+    begun = [told(*running, age_s=age_s).begins_s for age_s in (0.0, 1.0, 60.0)]
+    assert JOB_START_S > begun[0] > begun[1] > begun[2] > 0.0
+    # One that waits begins when Slurm foresees it, or nobody knows.
+    soon = (datetime.now() + timedelta(hours=1)).isoformat(timespec="seconds")
+    foreseen = told(slurm.job(first, 5, "PENDING", "Resources", begins=soon))
+    assert foreseen.begins_s == pytest.approx(3600 + JOB_START_S, abs=5)
+    assert (foreseen.cores, foreseen.awaits) == (16, "")
+    waiting = [slurm.job(run, 5, "PENDING", "Priority") for run in names]
+    assert told(*waiting).awaits == "once one of 2 waiting jobs begins"
+    assert told().awaits == "once the next job begins"
+    slurm.says("squeue", "".join(waiting))
+    said = status_text(plan, Path("results"), 2)
+    assert " on 16 cores once one of 2 waiting jobs begins, " in said
+
+
+def test_the_command_is_a_job_and_no_second_one_starts(
+    slurm: Slurm, plan: Plan, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.delenv("SLURM_JOB_ID", raising=False)
+    cluster(partition="short", account="sand")
+    slurm.says("sbatch", "12\n")
+    said = submit_driver(Path("trial.yaml"), SLURM)
+    log = "results/trial/logs/driver.log"
+    assert said == (
+        "The command is job 12 of the cluster: you can log out. sandmould status trial.yaml says "
+        f"where it stands, scancel 12 ends it, and what it says goes to {log}."
+    )
+    (call,) = slurm.calls("sbatch")
+    asked = {"--partition=short", "--account=sand", "--time=60", "--cpus-per-task=1", log}
+    assert asked <= {*call.split()}
+    words = f"{sys.executable} -m sandmould.cli run trial.yaml -- --workflow-profile slurm &"
+    assert words in call
+    # It waits in the queue.
+    slurm.says("squeue", slurm.job("trial", 12, "PENDING", "Priority", comment="driver_of_"))
+    lines = status_text(plan, Path("results"), 2).splitlines()
+    assert f"the command is job 12, pending (Priority); it writes {log}" in lines
+    for start in (submit_driver, run_study):
+        with pytest.raises(BadInputError) as told:
+            start(Path("trial.yaml"), SLURM)
+        assert str(told.value) == (
+            "job 12 of the cluster (pending) computes trial already: scancel 12 ends it."
+        )
+    monkeypatch.setenv("SLURM_JOB_ID", "12")
+    replace_driver("trial")  # it is this process
+    # It has ended.
+    slurm.says("squeue", slurm.job("trial", 12, "FAILED", "None", comment="driver_of_"))
+    Path(log).write_text("first\ntrial: 2 of 2 runs done\n\n")
+    lines = status_text(plan, Path("results"), 2).splitlines()
+    assert f"the command was a job, which has ended: trial: 2 of 2 runs done ({log})" in lines
+    # Nothing is left of it once another start has begun.
+    monkeypatch.delenv("SLURM_JOB_ID")
+    replace_driver("trial")
+    assert "the command" not in status_text(plan, Path("results"), 2)
+
+
+def test_without_slurm_no_job_can_be_submitted(plan: Plan, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setenv("PATH", "nowhere")
+    with pytest.raises(BadInputError) as told:
+        submit_driver(Path("trial.yaml"), SLURM)
+    assert str(told.value).startswith(
+        "--cluster = 'Slurm' cannot be used: valid is a machine from which Slurm answers, since "
+    )
+
+
+def test_the_jobs_of_a_start_end_with_it_and_earlier_ones_are_named(
+    slurm: Slurm, plan: Plan
+) -> None:
+    first, second = (run.run for run in plan.runs)
+    old = slurm.job(first, 4, "RUNNING", "None") + slurm.job(second, 5, "PENDING", "Priority")
+    slurm.says("squeue", old)
+    earlier = jobs_of([first, second])
+    slurm.says(
+        "squeue",
+        old
+        + slurm.job(first, 6, "PENDING", "Dependency")
+        + slurm.job(first, 7, "COMPLETING", "None")
+        + slurm.job(second, 8, "RUNNING", "None")
+        + slurm.job(second, 9, "COMPLETED", "None"),
+    )
+    said = end_jobs(jobs_of([first, second]), earlier)
+    assert said == "Jobs of an earlier start go on: 4, 5. To end them: scancel 4 5"
+    assert slurm.calls("scancel") == ["6 7 8"]
+    assert end_jobs([], earlier) == ""
 
 
 def test_short_runs_take_whole_nodes_by_default(slurm: Slurm) -> None:

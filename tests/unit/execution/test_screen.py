@@ -274,13 +274,34 @@ def test_the_last_line_is_the_verdict_and_the_report(tmp_path: Path) -> None:
 
 def test_trouble_is_told_once(tmp_path: Path) -> None:
     log = tmp_path / "snakemake.log"
-    assert trouble(log) == []
+    assert trouble(tmp_path, log) == ""
+    told = 'The study stopped outside its runs. Snakemake told "{}". All that it said: ' + str(log)
     log.write_text(
         "host: here\nMissingInputException in rule x:\n\nMissingInputException in rule x:\n"
     )
-    assert trouble(log) == ["MissingInputException in rule x:"]
+    assert trouble(tmp_path, log) == told.format("MissingInputException in rule x:")
     log.write_text("one\ntwo\n")
-    assert trouble(log) == ["one", "two"]
+    assert trouble(tmp_path, log) == told.format("one; two")
+
+
+@pytest.mark.parametrize(
+    ("line", "refused"),
+    [
+        ("OSError: [Errno 28] No space left on device", "{} could not be written: No space left"),
+        ("OSError: [Errno 13] Permission denied: '/a/b'", "/a/b could not be written: Permission"),
+        ("runs/r1/deck.in: Permission denied", "runs/r1/deck.in could not be written: Permission"),
+        ("r1: disk refused. No space left on device: None", "{} could not be written: No space"),
+    ],
+)
+def test_a_file_that_was_refused_is_named_without_snakemakes_words(
+    line: str, refused: str, tmp_path: Path
+) -> None:
+    log = tmp_path / "snakemake.log"
+    log.write_text(f"Error in rule x:\n{line}\nRuleException:\n")
+    said = trouble(tmp_path, log)
+    assert said.startswith(f"The study stopped, since {refused.format(tmp_path)}")
+    assert said.endswith("once that is mended, the same command goes on.")
+    assert "Rule" not in said
 
 
 @pytest.mark.parametrize(

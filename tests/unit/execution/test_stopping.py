@@ -77,6 +77,23 @@ def test_under_nohup_a_closed_terminal_ends_nothing() -> None:
     assert gone(job)
 
 
+def test_temporary_files_of_a_killed_command_go_with_the_next(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setenv("TMPDIR", str(tmp_path))
+    process, job = started()
+    process.kill()
+    process.wait(timeout=30)
+    os.kill(job, signal.SIGKILL)
+    (left,) = tmp_path.iterdir()
+    process, _ = started()
+    assert not left.exists()
+    assert len([*tmp_path.iterdir()]) == 1
+    process.terminate()
+    process.communicate(timeout=30)
+    assert [*tmp_path.iterdir()] == []
+
+
 def test_a_killed_command_leaves_no_snakemake_behind() -> None:
     process, job = started()
     parent = int(Path(f"/proc/{job}/stat").read_text().rpartition(")")[2].split()[1])

@@ -23,6 +23,15 @@ def test_a_file_appears_when_it_is_whole(tmp_path: Path) -> None:
     assert list(tmp_path.iterdir()) == [path]
 
 
+def test_a_full_disk_is_told_with_the_name_of_the_file(tmp_path: Path) -> None:
+    path = tmp_path / "table.tsv"
+    write_text(path, "old")
+    path.with_name("table.tsv.partial").symlink_to("/dev/full")
+    with pytest.raises(OSError, match=r"No space left on device: .*table\.tsv'"):
+        write_text(path, "new")
+    assert path.read_text(encoding="utf-8") == "old"
+
+
 def test_an_error_leaves_the_file_as_it_was(tmp_path: Path) -> None:
     path = tmp_path / "table.tsv"
     write_text(path, "old")

@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import errno
 import json
+import os
 import signal
 from collections.abc import Callable
 from pathlib import Path
@@ -204,6 +206,22 @@ def test_a_run_that_breaks_does_not_stop_the_others(
         compute_all(folders, tmp_path / "log")
     assert f"{folders[0].name}: no space left" in capfd.readouterr().err
     assert done.measured == [folder.name for folder in folders[1:]]
+
+
+def test_a_run_that_the_disk_refused_has_not_failed(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capfd: pytest.CaptureFixture[str]
+) -> None:
+    folder = planned(tmp_path)[0]
+    run = read_run(folder / "scenario.yaml")
+
+    def full(folder: Path, run: Run) -> int:
+        raise OSError(errno.ENOSPC, os.strerror(errno.ENOSPC), "checkpoint.bin")
+
+    monkeypatch.setattr(jobs, "simulate", full)
+    assert jobs._simulate(folder, 1, "", run) == RESTARTABLE_EXIT
+    said = f"{run.run}: the disk refused. [Errno 28] No space left on device: 'checkpoint.bin'\n"
+    assert capfd.readouterr().err == said
+    assert not (folder / "outcome.json").exists()
 
 
 @pytest.mark.parametrize("status", [jobs.ASKED_EXIT, -signal.SIGTERM])
