@@ -12,12 +12,12 @@ import pandas as pd
 import pytest
 
 from sandmould import ROOT
-from sandmould.kernel_cache import user_cache
 from sandmould.kinds.registry import kind_named, kind_of
 from sandmould.runs.outcome import Outcome
 from sandmould.runs.run_tables import read_costs
 from sandmould.study.plan.expand import expand
 from sandmould.study.plan.load_study import open_study
+from sandmould.user_cache import user_cache
 from tests.workflow.dry_runs import dry_run
 from tests.workflow.runs import kill_at_a_checkpoint
 
