@@ -47,7 +47,7 @@ def compute(scenario: OwnDeck, folder: Path, run: str, study: str) -> Computed:
     ----------
     scenario : OwnDeck
     folder : Path
-        The run's, with its rendered deck; that runs in ``work/output``.
+        The run's, with its deck where that is rendered; it runs in ``work/output``.
     run, study : str
 
     Raises
@@ -59,7 +59,7 @@ def compute(scenario: OwnDeck, folder: Path, run: str, study: str) -> Computed:
     world = engine.communicator()
     is_root = world is None or world.rank == 0
     work = folder / "work"
-    output = work / OUTPUT
+    output, rendered = work / OUTPUT, folder / _DECK
     candidates = [f"../{path.name}" for path in restarts(scenario, work)] if is_root else []
     if world is not None:
         candidates = world.bcast(candidates)
@@ -72,8 +72,10 @@ def compute(scenario: OwnDeck, folder: Path, run: str, study: str) -> Computed:
         logs = _logs(work)
         log = work / f"engine_{len(logs) + 1}.log"
         if is_root:
-            rendered = folder / _DECK
-            deck = render(scenario, run, study, restart) if restart else rendered.read_text("utf-8")
+            if restart or not rendered.is_file():
+                deck = render(scenario, run, study, restart)
+            else:
+                deck = rendered.read_text(encoding="utf-8")
             _lay_out(scenario, output, deck, bool(restart))
         if world is not None:
             world.barrier()
