@@ -326,7 +326,7 @@ def export(
         typer.Argument(metavar="RUN...", help="Names of measured runs, STUDY/RUN, or folders."),
     ],
 ) -> None:
-    """Write the picture of runs and their files for ParaView and OVITO into their folders."""
+    """Draw the end of runs, and write files for ParaView and OVITO."""
     from sandmould.execution.again import run_folders
     from sandmould.execution.simulate import export_run
     from sandmould.study.plan.batches import is_done
