@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import ast
+import contextlib
 import functools
 import hashlib
 import re
@@ -10,6 +11,8 @@ import tomllib
 from collections.abc import Iterable, Iterator
 from pathlib import Path
 from typing import Any
+
+from sandmould.user_cache import user_cache
 
 _Block = ast.FunctionDef | ast.AsyncFunctionDef | ast.ClassDef
 _PATH = re.compile(r"\bsandmould[./][\w./]*")
@@ -61,15 +64,29 @@ def code_digest(paths: Iterable[Path]) -> str:
     annotations of functions and of their variables, and in which of the files a statement of a
     module stands. Fields of classes are code: their annotations stay.
     """
-    statements = [text for path in paths for text in _statements_in(path.read_bytes())]
-    return digest("\n".join(sorted(statements)))[:SHORT]
+    return _digest_of(tuple(path.read_bytes() for path in paths))
 
 
 @functools.cache
-def _statements_in(source: bytes) -> tuple[str, ...]:
-    """What each statement of a module computes; kept, since a plan asks for each of its runs."""
+def _digest_of(sources: tuple[bytes, ...]) -> str:
+    """The same of texts, kept for later starts by their hashes and that of this file."""
+    own = Path(__file__).read_bytes()
+    kept = user_cache() / "code" / digest(*map(digest, (own, *sources)))
+    with contextlib.suppress(OSError):
+        if len(known := kept.read_text(encoding="ascii", errors="replace")) == SHORT:
+            return known
+    statements = [text for source in sources for text in _statements_in(source)]
+    found = digest("\n".join(sorted(statements)))[:SHORT]
+    with contextlib.suppress(OSError):  # it is found anew where nothing can be kept
+        kept.parent.mkdir(parents=True, exist_ok=True)
+        kept.write_text(found, encoding="ascii")
+    return found
+
+
+def _statements_in(source: bytes) -> Iterator[str]:
+    """What each statement of a module computes."""
     module = _Computing().visit(ast.parse(source))
-    return tuple(_text(statement) for statement in module.body if not _for_types(statement))
+    return (_text(statement) for statement in module.body if not _for_types(statement))
 
 
 def _for_types(statement: ast.stmt) -> bool:

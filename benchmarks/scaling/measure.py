@@ -99,7 +99,7 @@ def files(place: Place, runs: int) -> Row:
     own = [[p for p in f.rglob("*") if p.is_file()] for f in folders]
     logs = [p for p in (place.results(runs) / "logs").rglob("*") if p.is_file()]
     snakemakes = [p for p in (place.folder / ".snakemake").rglob("*") if p.is_file()]
-    recorded = [[p for p in f if p.parent.name in ("snapshots", "exports")] for f in own]
+    recorded = [[p for p in f if p.name == "snapshots.npz"] for f in own]
     return {
         "files": mean(len(f) for f in own),
         "of_snapshots": mean(len(f) for f in recorded),

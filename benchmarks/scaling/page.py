@@ -72,7 +72,7 @@ def _run_parts(parts: dict[str, float]) -> dict[str, float]:
         "the run's process beside imports: kernels, the loop, records, provenance":
             parts["process of a run"] - python_s - imports_s,
         "rendering": parts["rendering"],
-        "measuring, pictures, exports": parts["measuring"],
+        "measuring": parts["measuring"],
     }  # fmt: skip
 
 

@@ -328,6 +328,29 @@ def show(
     typer.echo(out)
 
 
+@app.command(epilog="Example: sandmould export tube_demo/frequency_25_r1_45f4dc")
+def export(
+    runs: Annotated[
+        list[str],
+        typer.Argument(metavar="RUN...", help="Names of measured runs, STUDY/RUN, or folders."),
+    ],
+) -> None:
+    """Draw the end of runs, and write files for ParaView and OVITO."""
+    from sandmould.execution.again import run_folders
+    from sandmould.execution.simulate import export_run
+    from sandmould.study.plan.batches import is_done
+    from sandmould.study.plan.build_plan import RESULTS, writing
+
+    folders, problems = run_folders(runs, RESULTS)
+    problems += [Problem("RUN", f.name, "a run at its end") for f in folders if not is_done(f)]
+    if problems:
+        raise BadInputError(problems)
+    for folder in folders:
+        with writing(folder):
+            export_run(folder)
+        typer.echo(folder)
+
+
 @app.command(epilog="Example: sandmould report my_study.yaml")
 def report(study: StudyFile) -> None:
     """Write the report of a study again from its results."""

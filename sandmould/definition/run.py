@@ -16,8 +16,12 @@ FILL = "fill"
 """Part of a run that is no result: a fill that runs of the study share."""
 FILLS = "fills"
 """Folder of those, beside that of the runs."""
-LAST_MEASURED = "final.png"
+LAST_MEASURED = "measures.tsv"
 """File of a run's folder that is written after all else that is measured."""
+PICTURE = "final.png"
+"""What an export of a run draws."""
+EXPORTED = (PICTURE, "exports.zip", "fields.vtu")
+"""Files of a run's folder that are made when asked for, see ``Execution.export``."""
 
 
 @dataclass(frozen=True)

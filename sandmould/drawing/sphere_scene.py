@@ -25,7 +25,7 @@ _GRIDS = (512, 256, 128, 64)
 """Cells of such grids across the longest side."""
 _SHARP = np.cos(np.deg2rad(25.0))
 """An edge is drawn where faces turn by more than this."""
-SHADES = tuple(to_hex(colormaps["viridis"](k / 254)) for k in range(255))
+SHADES = tuple(to_hex(colour) for colour in colormaps["viridis"](np.arange(255) / 254))
 
 
 def sphere_scene(scenario: Scenario, top_m: float) -> dict[str, object]:

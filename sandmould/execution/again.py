@@ -38,14 +38,7 @@ def forget(names: Sequence[str], results: Path) -> list[Path]:
         Before anything is forgotten: where a run is unknown, is of several studies, is being
         computed, or its study's file is not there or leads to it no longer.
     """
-    problems: list[Problem] = []
-    folders: dict[Path, None] = {}
-    for name in names:
-        found = _folders(name, results)
-        if len(found) == 1:
-            folders[found[0]] = None
-        else:
-            problems.append(Problem("RUN", name, _which(name, found, results)))
+    folders, problems = run_folders(names, results)
     studies: dict[Path, Path] = {}
     for study in dict.fromkeys(folder.parent.parent for folder in folders):
         path = owner_path(study) or _of_name(study.name)
@@ -70,6 +63,19 @@ def forget(names: Sequence[str], results: Path) -> list[Path]:
             for name in ("outcome.json", MANIFEST_FILE):
                 (place / name).unlink(missing_ok=True)
     return list(dict.fromkeys(studies.values()))
+
+
+def run_folders(names: Sequence[str], results: Path) -> tuple[list[Path], list[Problem]]:
+    """Folders of runs by what a user calls them, see ``forget``, and a problem for each other."""
+    problems: list[Problem] = []
+    folders: dict[Path, None] = {}
+    for name in names:
+        found = _folders(name, results)
+        if len(found) == 1:
+            folders[found[0]] = None
+        else:
+            problems.append(Problem("RUN", name, _which(name, found, results)))
+    return list(folders), problems
 
 
 def _failed_fill(folder: Path) -> list[Path]:

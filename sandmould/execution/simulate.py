@@ -9,7 +9,7 @@ from pathlib import Path
 from typing import Any
 
 import sandmould.runs.one_blas_thread  # noqa: F401
-from sandmould.definition.run import Run
+from sandmould.definition.run import EXPORTED, Run
 from sandmould.kinds.registry import kind_of
 from sandmould.module_main import run_main
 from sandmould.runs.manifest import write_manifest
@@ -33,6 +33,12 @@ def measure_run(folder: Path) -> None:
     measure(read_run(folder / "scenario.yaml"), folder)
 
 
+def export_run(folder: Path) -> None:
+    """Draw the end of a measured run, and write what other programs read."""
+    run = read_run(folder / "scenario.yaml")
+    kind_of(run.scenario).execution.export(run, folder)
+
+
 def render(run: Run, folder: Path) -> None:
     """The same of a run that is read already."""
     kind_of(run.scenario).execution.render(run, folder)
@@ -40,6 +46,8 @@ def render(run: Run, folder: Path) -> None:
 
 def measure(run: Run, folder: Path) -> None:
     """The same of a run that is read already; what it writes is written down."""
+    for old in EXPORTED:  # of other grains, or drawn by other code
+        (folder / old).unlink(missing_ok=True)
     earlier = {path: path.stat().st_mtime_ns for path in folder.rglob("*") if path.is_file()}
     kind_of(run.scenario).execution.measure(run, folder)
     written = {

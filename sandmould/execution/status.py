@@ -29,10 +29,9 @@ from sandmould.plain_file import UNREADABLE, read_json
 from sandmould.runs.claim import owner_of
 from sandmould.runs.formatting import size_text
 from sandmould.runs.hashing import scenario_hash
-from sandmould.runs.manifest import change, has_all_hashes, read_manifest
+from sandmould.runs.manifest import change, has_all_hashes, read_cost, read_manifest
 from sandmould.runs.outcome import Outcome, RunOutcome
 from sandmould.runs.progress import duration_text
-from sandmould.runs.run_tables import read_costs
 from sandmould.study.plan.build_plan import Plan, stored_speeds
 from sandmould.study.plan.lacking import WHOLE, Lack, Need
 from sandmould.study.plan.plan_files import read_run
@@ -107,7 +106,7 @@ def _ended(folder: Path) -> RunStatus:
     outcome = RunOutcome.read(folder / "outcome.json")
     cpu_s = wall_s = math.nan
     with contextlib.suppress(*UNREADABLE):
-        cost = read_costs([folder]).rows.iloc[-1]
+        cost = read_cost(folder)
         cpu_s, wall_s = float(cost["cpu_s"]), float(cost["wall_s"])
     cpu_s = cpu_s if math.isfinite(cpu_s) else 0.0
     if outcome.outcome is Outcome.FINISHED:

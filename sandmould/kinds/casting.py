@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any, Protocol
 
 import numpy as np
 
-from sandmould.definition.run import LAST_MEASURED, Run
+from sandmould.definition.run import LAST_MEASURED, PICTURE, Run
 from sandmould.kinds.kind import Execution, Planning, ScenarioT
 from sandmould.runs.files import replaced
 from sandmould.runs.products import Computed, Cost
@@ -89,7 +89,7 @@ def read_fields(folder: Path) -> dict[str, Any] | None:
 
 def write_measures(folder: Path, table: pd.DataFrame) -> None:
     """Write the measures of a run."""
-    with replaced(folder / "measures.tsv") as partial:
+    with replaced(folder / LAST_MEASURED) as partial:
         table.to_csv(partial, sep="\t", index=False, float_format="%.10g")
 
 
@@ -104,4 +104,4 @@ def write_picture(
         draw(figure.subplots())
     else:
         figure.text(0.5, 0.5, "No fields: the run broke off.", ha="center")
-    figure.savefig(folder / LAST_MEASURED)
+    figure.savefig(folder / PICTURE)

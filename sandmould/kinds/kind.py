@@ -200,7 +200,10 @@ class Execution(ABC, Generic[ScenarioT]):
 
     @abstractmethod
     def measure(self, run: Run, folder: Path) -> None:
-        """Measure what a run left behind; the picture last."""
+        """Measure what a run left behind; ``measures.tsv`` last."""
+
+    def export(self, run: Run, folder: Path) -> None:
+        """Draw the end of a measured run, and write what other programs read: ``EXPORTED``."""
 
     def render(self, run: Run, folder: Path) -> None:
         """Write the deck of a run into its folder: every value of its scenario, with its source."""

@@ -11,11 +11,10 @@ from importlib.metadata import version
 from pathlib import Path
 from typing import Generic, TypeVar
 
-from llvmlite import binding
-
 from sandmould.digest import SHORT, digest
-from sandmould.kernel_cache import user_cache
+from sandmould.runs.provenance import processor
 from sandmould.scenario.quantity import Section
+from sandmould.user_cache import user_cache
 
 SceneT = TypeVar("SceneT", bound=Section)
 
@@ -86,6 +85,6 @@ class StoredSpeed(ABC, Generic[SceneT]):
 
     def file(self, scenario: SceneT) -> Path:
         """Where the speed of a scenario is kept, by all that it depends on."""
-        processor = f"{platform.node()} {binding.get_host_cpu_name()} numba {version('numba')}"
-        key = digest(f"{processor} {self.computed_by(scenario)}")[:SHORT]
+        machine = f"{platform.node()} {processor()} numba {version('numba')}"
+        key = digest(f"{machine} {self.computed_by(scenario)}")[:SHORT]
         return user_cache() / "speeds" / f"{key}.txt"

@@ -8,7 +8,7 @@ from typing import Any
 
 import pandas as pd
 
-from sandmould.kinds.sand.loose import LOOSE_ZONES
+from sandmould.kinds.sand.measures import seeks_loose_sand
 from sandmould.report.tables import Cell, Column, Table
 from sandmould.runs.columns import RUN
 from sandmould.runs.formatting import listed, number
@@ -33,8 +33,12 @@ def loose_sand_pages(
     scenario : Scenario
         Its grains are the measure of a zone.
     """
+    if not run or not seeks_loose_sand(scenario):
+        return None
+    from sandmould.kinds.sand.loose import LOOSE_ZONES  # scipy: few reports need it
+
     path = folder / "runs" / run / LOOSE_ZONES
-    if not run or not path.is_file():
+    if not path.is_file():
         return None
     row = summary.loc[summary[RUN] == run].iloc[0]
     shares = {side: float(row[f"loose_{side}_fraction"]) for side in (*_SIDES, "away")}

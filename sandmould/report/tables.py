@@ -358,7 +358,7 @@ _FILES = (
     (FIGURES, "main figures as files: charts as SVG, sand as PNG"),
     ("agreement.tsv", "one row per compared pair of settings and measure"),
     ("runs", "one folder per run: scenario, deck, outcome, provenance, time series, wall loads, "
-     "snapshots; exports.zip holds some of them for ParaView (.vtu) and OVITO (.dump)"),
+     "snapshots; sandmould export RUN adds some for ParaView (.vtu) and OVITO (.dump)"),
 )  # fmt: skip
 
 

@@ -5,6 +5,7 @@ What is lost or cut short later is seen by the sizes, at every start; all else b
 
 from __future__ import annotations
 
+import csv
 import json
 import stat
 from collections.abc import Iterator, Mapping
@@ -12,7 +13,7 @@ from pathlib import Path
 from typing import Any, Literal
 
 from sandmould.digest import digest, file_digest
-from sandmould.plain_file import read_json
+from sandmould.plain_file import read_json, read_plain
 from sandmould.runs.files import write_text
 
 MANIFEST_FILE = "products.json"
@@ -142,14 +143,17 @@ def read_origin(folder: Path) -> dict[str, Any]:
 
 
 def read_cost(folder: Path) -> dict[str, Any]:
-    """Cost row of a run; empty for one that has none, or has it in a table of its own.
+    """Cost row of a run, as text where it is a table of its own; empty where there is none.
 
     Raises
     ------
     OSError, ValueError
         When it cannot be read.
     """
-    return (read_manifest(folder) or {}).get("cost", {})
+    cost: dict[str, Any] = (read_manifest(folder) or {}).get("cost", {})
+    if not cost and (older := folder / OLDER_COST).exists():
+        return [*csv.DictReader(read_plain(older).splitlines(), delimiter="\t")][-1]
+    return cost
 
 
 def deck_damage(folder: Path, manifest: Manifest) -> str:

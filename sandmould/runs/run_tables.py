@@ -12,7 +12,7 @@ import pandas as pd
 from numpy.typing import NDArray
 
 from sandmould.plain_file import UNREADABLE
-from sandmould.runs.manifest import MANIFEST_FILE, OLDER_COST, read_cost
+from sandmould.runs.manifest import MANIFEST_FILE, OLDER_COST, read_manifest
 
 PLACE = "place of the file"
 """Column of a joined table: the place of a row's file among those that were read."""
@@ -121,7 +121,7 @@ def read_costs(folders: Sequence[Path]) -> RunTables:
     rows, columns, problems = [], dict(older.columns), dict(older.problems)
     for place, folder in enumerate(folders):
         try:
-            cost = read_cost(folder)
+            cost = (read_manifest(folder) or {}).get("cost", {})
         except UNREADABLE as error:
             problems[place] = problem_text(MANIFEST_FILE, error)
             continue

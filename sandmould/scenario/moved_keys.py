@@ -74,7 +74,7 @@ REMOVED: dict[str, tuple[Any, str]] = {
     ),
     "scenario.record.export": (
         "moments",
-        "absent: exports.zip has the snapshots at 0, 1/8, 1/2 and 1 of the vibration, "
+        "absent: sandmould export writes the snapshots at 0, 1/8, 1/2 and 1 of the vibration, "
         "and every one lies in snapshots",
     ),
     **{

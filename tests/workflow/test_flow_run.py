@@ -38,7 +38,7 @@ def test_a_tiny_tank_stands_through_the_workflow(tmp_path: Path) -> None:
     for run in summary["run"]:
         folder = study / "runs" / str(run)
         left = {path.name for path in folder.iterdir()}
-        assert {"series.tsv", "fields.npz", "final.png", "products.json", "deck.in"} <= left
+        assert {"series.tsv", "fields.npz", "measures.tsv", "products.json", "deck.in"} <= left
     page = (study / "report.html").read_text()
     assert "2 excellent, 0 good and 0 failed" in page
     assert "Pressure noise" in page

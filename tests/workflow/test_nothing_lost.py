@@ -92,7 +92,7 @@ def test_what_is_lost_is_computed_again_and_nothing_else(here: Path) -> None:
     half(folder_of(plan, 1) / "outcome.json")
     (folder_of(plan, 2) / "fields.npz").unlink()
     (folder_of(plan, 3) / "series.tsv").write_bytes(b"")
-    half(folder_of(plan, 4) / "final.png")
+    half(folder_of(plan, 4) / "measures.tsv")
     lacks = plan.lacks(RESULTS)
     assert [lacks[name].need for name in names[:5]] == [Need.COMPUTE] * 4 + [Need.MEASURE]
     # One answer three times: what a start would do, what status says, what a start does.

@@ -12,12 +12,12 @@ import pandas as pd
 import pytest
 
 from sandmould import ROOT
-from sandmould.kernel_cache import user_cache
 from sandmould.kinds.registry import kind_named, kind_of
 from sandmould.runs.outcome import Outcome
 from sandmould.runs.run_tables import read_costs
 from sandmould.study.plan.expand import expand
 from sandmould.study.plan.load_study import open_study
+from sandmould.user_cache import user_cache
 from tests.workflow.dry_runs import dry_run
 from tests.workflow.runs import kill_at_a_checkpoint
 
@@ -227,8 +227,10 @@ def test_small_tube_in_3d(checkout: Path) -> None:
     # Below dense random packing, 0.64; walls a few diameters apart and the hollow under the tube
     # take up to a third of loose random packing, 0.55.
     assert 0.36 < summary.solid_fraction < 0.64
-    (exports,) = results.glob("runs/*/exports.zip")
-    names = zipfile.ZipFile(exports).namelist()
+    (run,) = results.glob("runs/*")
+    subprocess.run([SNAKEMAKE.with_name("sandmould"), "export", run], cwd=checkout, check=True)
+    assert (run / "final.png").stat().st_size > 5000
+    names = zipfile.ZipFile(run / "exports.zip").namelist()
     counted = Counter(Path(name).suffix for name in names if name != "solids.vtu")
     assert counted[".vtu"] == counted[".dump"] >= 3
     assert "solids.vtu" in names

@@ -45,7 +45,7 @@ def test_a_tiny_casting_solidifies_through_the_workflow(tmp_path: Path) -> None:
     for run in summary["run"]:
         folder = study / "runs" / str(run)
         left = {path.name for path in folder.iterdir()}
-        assert {"series.tsv", "fields.npz", "final.png", "products.json", "deck.in"} <= left
+        assert {"series.tsv", "fields.npz", "measures.tsv", "products.json", "deck.in"} <= left
     page = (study / "report.html").read_text()
     assert "last point to freeze" in page
     assert "Error and cost" in page

@@ -78,7 +78,13 @@ rule report:
             labels={"table": "findings, pictures, verdict"},
         ),
         verdict=f"{FOLDER}/verdict.txt",
-        figures=directory(f"{FOLDER}/figures"),
+        figures=report(
+            directory(f"{FOLDER}/figures"),
+            patterns=["{name}.svg", "{name}.png"],
+            caption="../report/figure.rst",
+            category="Study",
+            subcategory="Figures",
+        ),
     log:
         f"{FOLDER}/logs/report.log",
     conda:

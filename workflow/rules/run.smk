@@ -96,13 +96,6 @@ rule measure:
             subcategory="Measures",
             labels=labels_of,
         ),
-        picture=report(
-            f"{FOLDER}/runs/{{run}}/final.png",
-            caption="../report/picture.rst",
-            category="Runs",
-            subcategory="Final state",
-            labels=labels_of,
-        ),
     log:
         f"{FOLDER}/logs/measure_{{run}}.log",
     # A run that is computed is measured before the next one begins: its value is seen at once.

@@ -24,7 +24,7 @@ import pandas as pd
 from benchmarks.frame.source_tree import unpack
 from sandmould import ROOT, geometry, pattern_fe
 from sandmould.casting import arpm, mps
-from sandmould.definition.run import Run
+from sandmould.definition.run import EXPORTED, Run
 from sandmould.digest import EQUAL_CODE, SHORT, code_digest, equal_code
 from sandmould.engines.registry import code_groups
 from sandmould.kinds.registry import KINDS
@@ -35,8 +35,8 @@ from sandmould.study.plan.expand import expand
 from sandmould.study.plan.load_study import open_study
 
 STUDIES = Path(__file__).parent
-APART = {"deck.in", "engine.log", "products.json", "scenario.yaml", "final.png"}
-"""Files of a run that hold times, versions and names, or are drawn."""
+APART = {"deck.in", "engine.log", "products.json", "scenario.yaml", *EXPORTED}
+"""Files of a run that hold times, versions and names, or are made when asked for."""
 TIMED = ["solve_s", "pattern_outside_fraction"]
 """Columns that hold times of the machine."""
 HEAD = """\

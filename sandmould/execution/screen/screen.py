@@ -220,7 +220,7 @@ class Screen:
             left_s=left_s,
             awaits=awaits,
             share=passed_s / (passed_s + left_s) if passed_s + left_s else 0.0,
-            so_far=self._so_far_known().sentence() if self._done or self.failures else "",
+            so_far=self._said_so_far(),
             ended=tuple(self._ended),
             failures=tuple(self.failures),
         )
@@ -234,6 +234,11 @@ class Screen:
         if not self._watch.waiting and any(job.lives for job in self._jobs):
             return Outlook(self._cores, awaits="the end of jobs in the queue")
         return outlook(self._jobs, computes, self._cores, now - self._asked_s)
+
+    def _said_so_far(self) -> str:
+        """What the runs say; nothing at the end of a start that had nothing to compute."""
+        judged = self._so_far is not None or self._watch.waiting
+        return self._so_far_known().sentence() if judged and (self._done or self.failures) else ""
 
     def _share(self, at: Running, passed_s: float) -> float:
         """What is done of a run; of one that cannot tell, by the time that it has taken."""

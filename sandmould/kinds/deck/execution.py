@@ -3,11 +3,10 @@
 from __future__ import annotations
 
 import math
-from importlib import import_module
 from pathlib import Path
 
 from sandmould.definition.run import Run
-from sandmould.kinds.deck.measure import measure_deck
+from sandmould.kinds.deck.measure import draw_measures, measure_deck
 from sandmould.kinds.deck.own import computation
 from sandmould.kinds.deck.own import deck as own_deck
 from sandmould.kinds.kind import Execution
@@ -39,10 +38,10 @@ class DeckExecution(Execution[OwnDeck]):
         """Cost before the engine has started."""
         return Cost(scenario.engine.name, scenario.engine.ranks, math.nan, math.nan)
 
-    def load_measuring(self, scenario: OwnDeck) -> None:
-        """Import what draws."""
-        import_module("matplotlib.figure")
-
     def measure(self, run: Run, folder: Path) -> None:
-        """Write the measures against time, and draw them."""
+        """Write the measures against time."""
         measure_deck(run.scenario, folder)
+
+    def export(self, run: Run, folder: Path) -> None:
+        """Draw the measures against time."""
+        draw_measures(run.scenario, folder)

@@ -5,13 +5,15 @@ from __future__ import annotations
 import contextlib
 import json
 import math
+import multiprocessing
+import os
 import shutil
-import subprocess
-import sys
+import signal
 import tempfile
 import textwrap
 import time
 from collections.abc import Sequence
+from multiprocessing.context import ForkProcess
 from pathlib import Path
 
 import numpy as np
@@ -25,10 +27,9 @@ from sandmould.kinds.deck.own import deck as own_deck
 from sandmould.kinds.deck.own.columns import missing_columns
 from sandmould.kinds.deck.own.thermo import STEP
 from sandmould.kinds.stored_speed import StoredSpeed
-from sandmould.module_main import run_main
 from sandmould.runs.files import write_text
 from sandmould.runs.formatting import display_number, name_of
-from sandmould.runs.parent import end_with_parent
+from sandmould.runs.parent import end_with_parent, print_to
 from sandmould.runs.words import say
 from sandmould.scenario.own_deck import OwnDeck
 
@@ -111,8 +112,8 @@ def pilot(scenario: OwnDeck, results: Path, pilot_s: float = PILOT_S) -> tuple[f
     with tempfile.TemporaryDirectory() as name:
         folder = Path(name) / "runs" / "pilot"
         folder.mkdir(parents=True)
-        write_text(folder / "scenario.json", scenario.model_dump_json())
-        core_s, status = _computed(folder, pilot_s)
+        write_text(folder / "deck.in", own_deck.render(scenario, "pilot", "pilot"))
+        core_s, status = _computed(scenario, folder, pilot_s)
         if status is not None and not (folder / "whole.json").exists():
             raise BadInputError([_failure(scenario, folder, status, results)])
         whole = computation.series(scenario, folder / "work")
@@ -120,18 +121,15 @@ def pilot(scenario: OwnDeck, results: Path, pilot_s: float = PILOT_S) -> tuple[f
         return core_s, "\n".join(f"{_of_values(scenario)}: {said}." for said in shown if said)
 
 
-def _computed(folder: Path, pilot_s: float) -> tuple[float | None, int | None]:
+def _computed(scenario: OwnDeck, folder: Path, pilot_s: float) -> tuple[float | None, int | None]:
     """Processor time of a whole run, and the status with which the pilot ended, if it did."""
-    with (folder / "log").open("w") as log:
-        process = subprocess.Popen(
-            [sys.executable, "-m", __name__, str(folder)],
-            stdin=subprocess.DEVNULL, stdout=log, stderr=log, preexec_fn=end_with_parent,
-        )  # fmt: skip
+    process = multiprocessing.get_context("fork").Process(target=_compute, args=(scenario, folder))
+    process.start()
     try:
-        return _watched(process, folder, pilot_s), process.returncode
+        return _watched(process, folder, pilot_s), process.exitcode
     finally:
         process.kill()
-        process.wait()
+        process.join()
 
 
 def _lacks(scenario: OwnDeck, series: pd.DataFrame) -> str:
@@ -150,7 +148,7 @@ def _resumed(scenario: OwnDeck, whole: pd.DataFrame, folder: Path, pilot_s: floa
         newer.unlink()
     for left in (folder / "begun", folder / "whole.json", why):
         left.unlink(missing_ok=True)
-    _computed(folder, pilot_s)
+    _computed(scenario, folder, pilot_s)
     said = why.read_text(encoding="utf-8") if why.exists() else computation.WENT_ON
     if not said.startswith(computation.WENT_ON):
         return f"a run that is killed does not go on as it should. {said}"
@@ -208,11 +206,11 @@ def _of_values(scenario: OwnDeck) -> str:
     return f"{Path(scenario.template).name} with the values {values}"
 
 
-def _watched(process: subprocess.Popen[bytes], folder: Path, pilot_s: float) -> float | None:
+def _watched(process: ForkProcess, folder: Path, pilot_s: float) -> float | None:
     """What a whole run takes, once the pilot has ended or has gone on for long enough."""
     whole, progress = folder / "whole.json", folder / "work" / "progress.json"
     begun_s = None
-    while process.poll() is None:
+    while process.is_alive():
         if begun_s is None and (folder / "begun").exists():
             begun_s = time.monotonic()
         if begun_s is not None and time.monotonic() - begun_s > pilot_s:
@@ -228,18 +226,15 @@ def _watched(process: subprocess.Popen[bytes], folder: Path, pilot_s: float) -> 
     return whole_s if math.isfinite(whole_s) else None
 
 
-def main(name: str) -> int:
+def _compute(scenario: OwnDeck, folder: Path) -> None:
     """Compute the pilot of a folder, in a process that may be killed."""
-    folder = Path(name)
-    scenario = OwnDeck.model_validate_json((folder / "scenario.json").read_text())
+    end_with_parent(signal.SIGKILL)
+    with (folder / "log").open("w") as log, open(os.devnull) as nothing:
+        os.dup2(nothing.fileno(), 0)
+        print_to(log.fileno())
     write_text(folder / "begun", "")
     computed = computation.compute(scenario, folder, "pilot", "pilot")
     outcome = computed.outcome
     write_text(folder / "why.txt", outcome.detail or outcome.outcome.label)
     if outcome.outcome == 0:
         write_text(folder / "whole.json", json.dumps(computed.cost.cpu_s))
-    return 0
-
-
-if __name__ == "__main__":
-    run_main(main, "python -m sandmould.kinds.deck.speed FOLDER-OF-A-PILOT", (1,))

@@ -26,9 +26,7 @@ class FlowExecution(CastingExecution[MetalFlow]):
     products = computation.PRODUCTS
 
     def measure(self, run: Run, folder: Path) -> None:
-        """Write the measures against time, those of the whole run in every row, and the picture."""
-        from sandmould.analysis.flow_plots import draw_last
-
+        """Write the measures against time, those of the whole run in every row."""
         scenario: MetalFlow = run.scenario
         outcome = RunOutcome.read(folder / "outcome.json")
         series = pd.read_csv(folder / "series.tsv", sep="\t")
@@ -48,10 +46,16 @@ class FlowExecution(CastingExecution[MetalFlow]):
         table["average_speed_m_s"] = measures.average_speed_m_s
         table["hops"] = int(measures.hops)
         table["classification"] = measures.verdict.value
-        fields, highest_pa = read_fields(folder), max(measures.ideal_pa.values())
-        for name, value in _at_the_end(fields).items():
+        for name, value in _at_the_end(read_fields(folder)).items():
             table[name] = value
         write_measures(folder, table)
+
+    def export(self, run: Run, folder: Path) -> None:
+        """Draw the last field."""
+        from sandmould.analysis.flow_plots import draw_last
+
+        fields, series = read_fields(folder), pd.read_csv(folder / "series.tsv", sep="\t")
+        highest_pa = max(measure_flow(run.scenario, series, "").ideal_pa.values())
         draw = partial(draw_last, fields, highest_pa=highest_pa) if fields else None
         write_picture(folder, (5, 6), draw)
 

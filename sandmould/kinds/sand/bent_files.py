@@ -28,6 +28,7 @@ def write_bent(scenario: Scenario, run_folder: Path, out: Path) -> None:
     out : Path
         Folder of ``pattern_filled.stl`` and its likes.
     """
+    out.mkdir(exist_ok=True)
     bent = BentPattern(scenario)
     for name, moment in shape_moments(list_moments(run_folder)).items():
         snapshot = moment.load()

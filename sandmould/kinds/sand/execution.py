@@ -3,11 +3,10 @@
 from __future__ import annotations
 
 import importlib
-import tempfile
 from pathlib import Path
 
 from sandmould.bad_input import BadInputError, Problem, display_path
-from sandmould.definition.run import FILL, Run
+from sandmould.definition.run import FILL, PICTURE, Run
 from sandmould.engines import recording, registry
 from sandmould.engines.driver import Driver, Opening
 from sandmould.engines.durations import cost_before
@@ -79,9 +78,16 @@ class SandExecution(Execution[Scenario]):
 
     def measure(self, run: Run, folder: Path) -> None:
         """Measure every snapshot."""
-        from sandmould.kinds.sand.measure import measure_sand  # draws: not every job needs that
+        from sandmould.kinds.sand.measure import measure_sand  # not every job needs that
 
         measure_sand(run.scenario, folder)
+
+    def export(self, run: Run, folder: Path) -> None:
+        """Draw the last snapshot, and write some for ParaView and OVITO."""
+        from sandmould.kinds.sand.exports import write_exports, write_picture  # they draw
+
+        write_picture(run.scenario, folder, folder / PICTURE)
+        write_exports(run.scenario, folder, folder / "exports.zip")
 
     def load_computing(self, scenario: Scenario) -> None:
         """Import the engine's side of the house, and the pattern's where there is one."""
@@ -92,12 +98,8 @@ class SandExecution(Execution[Scenario]):
             importlib.import_module("sandmould.pattern_fe.coupling.opening")
 
     def load_measuring(self, scenario: Scenario) -> None:
-        """Import what measures and draws."""
-        from sandmould.kinds.sand.measure import write_picture
-
-        # The first picture loads fonts, which every forked process would do again.
-        with tempfile.TemporaryDirectory() as name:
-            write_picture(scenario, Path(name), Path(name) / "first.png")
+        """Import what measures."""
+        importlib.import_module("sandmould.kinds.sand.measure")
         if scenario.pattern is not None:
             importlib.import_module("sandmould.kinds.sand.bent_files")
 

@@ -3,24 +3,19 @@
 from __future__ import annotations
 
 import math
-import tempfile
-from collections.abc import Iterable
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 import pandas as pd
-from matplotlib.figure import Figure
 
 from sandmould.analysis.bed_density import own_solid_fraction
 from sandmould.analysis.cavity_fill import cavity_fill, cavity_voids
 from sandmould.analysis.coordination import contacts
 from sandmould.analysis.deflection import fill_under
 from sandmould.analysis.density import apparent_density
-from sandmould.analysis.export import solids_to_vtk, to_ovito, to_vtk
 from sandmould.analysis.layers import mixing_index
 from sandmould.analysis.loose_zones import LooseSand
-from sandmould.analysis.plots import draw_by_layer, draw_scene
 from sandmould.analysis.reached_space import reached_share
 from sandmould.analysis.solid_fraction import (
     bed_surface_height_m,
@@ -39,10 +34,10 @@ from sandmould.kinds.sand.loose import (
     last_loose_sand,
     write_loose_zones,
 )
-from sandmould.kinds.sand.moments import MOMENTS, Moment, list_moments, nearest
+from sandmould.kinds.sand.moments import MOMENTS, list_moments, nearest
 from sandmould.kinds.sand.outflow import add_outflow, measure_outflow
 from sandmould.runs.columns import OVERLAP_P99_FRACTION
-from sandmould.runs.files import replaced, write_zip
+from sandmould.runs.files import replaced
 from sandmould.scenario.checks.cavities import free_share
 from sandmould.scenario.scenario import Scenario
 
@@ -131,58 +126,12 @@ def measure_sand(scenario: Scenario, folder: Path) -> None:
     loose = last_loose_sand(scenario, folder)
     if loose is not None:
         write_loose_zones(loose, folder / LOOSE_ZONES)
-    write_measures(scenario, folder, folder / "measures.tsv", loose)
-    write_exports(scenario, folder, folder / "exports")
     write_profile(scenario, folder, folder / "profile.tsv")
-    write_picture(scenario, folder, folder / LAST_MEASURED)
-
-
-def write_picture(scenario: Scenario, folder: Path, out: Path) -> None:
-    """Draw the last snapshot of a run by layer; the empty scene where there is none."""
-    figure = Figure(figsize=(6, 4.5), dpi=150)
-    ax = figure.add_axes((0.12, 0.12, 0.84, 0.8))  # a layout of its own would draw all twice
-    moments = list_moments(folder)
-    last = moments[-1].load() if moments else None
-    scene = scenario.scene if last is None else scene_at(scenario, last)
-    draw_scene(scene, ax, scenario.box.height_m)
-    if last is not None:
-        draw_by_layer(last, ax)
-    figure.savefig(out)
-
-
-def write_exports(scenario: Scenario, folder: Path, out: Path) -> None:
-    """Write the snapshots at the moments for ParaView (``.vtu``) and OVITO (``.dump``).
-
-    They go into one archive beside the folder, ``exports.zip``: a folder of them would be most of
-    the files of a sweep. A pattern's bent surface is always written, into the folder: it is what
-    the run was made for.
-    """
-    moments = list_moments(folder)
     if scenario.pattern is not None:
-        from sandmould.kinds.sand.bent_files import (
-            write_bent,  # scikit-fem: few studies need it
-        )
+        from sandmould.kinds.sand.bent_files import write_bent  # scikit-fem: few studies need it
 
-        out.mkdir(exist_ok=True)
-        write_bent(scenario, folder, out)
-    if not moments:
-        return
-    last_s = moments[-1].vibration_time_s
-    chosen = {nearest(moments, f * last_s) for f in MOMENTS.values()}
-    with tempfile.TemporaryDirectory() as name, replaced(out.with_suffix(".zip")) as partial:
-        written = Path(name)
-        if scenario.scene.solids:
-            solids_to_vtk(scenario.scene, written / "solids.vtu")
-        _write_moments(chosen, written)
-        write_zip(partial, {path.name: path for path in written.iterdir()})
-
-
-def _write_moments(moments: Iterable[Moment], out: Path) -> None:
-    """Write some snapshots for ParaView and OVITO into a folder."""
-    for moment in moments:
-        snapshot = moment.load()
-        to_vtk(snapshot, out / f"{moment.stored.name}.vtu")
-        to_ovito(snapshot, out / f"{moment.stored.name}.dump")
+        write_bent(scenario, folder, folder / "exports")
+    write_measures(scenario, folder, folder / LAST_MEASURED, loose)
 
 
 def write_profile(scenario: Scenario, folder: Path, out: Path) -> None:

@@ -2,12 +2,10 @@
 
 from __future__ import annotations
 
-import functools
-
 from sandmould.engines import registry
 from sandmould.geometry.mesh import TriangleMesh
 from sandmould.geometry.outline import Outline
-from sandmould.kernel_cache import are_compiled, cache_folder
+from sandmould.kernel_cache import are_compiled
 from sandmould.kinds.kind import Note
 from sandmould.kinds.sand.hardness_text import hardness_lines
 from sandmould.kinds.sand.narrow import narrow_spaces
@@ -23,7 +21,6 @@ HIGH_ACCELERATION_G = 20.0
 COMPILE_S = 25.0
 """Processor time for what a first run compiles: 24 s measured in 2D, 26 s in 3D, 24 s with a
 pattern (fe_column)."""
-_kernel_folder = functools.cache(cache_folder)
 
 
 def notes(scenario: Scenario) -> list[Note]:
@@ -32,7 +29,7 @@ def notes(scenario: Scenario) -> list[Note]:
     hardness = bed_hardness(scenario)
     told = [Note(head, text, head) for head, text in hardness_lines(hardness)] if hardness else []
     told += [Note(f"width of {name}", text) for name, text in narrow_spaces(scenario).items()]
-    if registry.calls_our_kernels(scenario) and not are_compiled("dem", _kernel_folder()):
+    if registry.calls_our_kernels(scenario) and not are_compiled("dem"):
         text = (
             "Sandmould's own code is not compiled on this machine yet. The first start compiles "
             f"it: about {COMPILE_S:g} s of a core more, once."

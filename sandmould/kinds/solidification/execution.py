@@ -3,13 +3,14 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Mapping
 from functools import partial
 from pathlib import Path
+from typing import Any
 
 import pandas as pd
 
-from sandmould.analysis.export import elements_to_vtk
-from sandmould.analysis.freezing import freezing
+from sandmould.analysis.freezing import Freezing, freezing
 from sandmould.casting.arpm import computation, scene
 from sandmould.definition.run import Run
 from sandmould.kinds.casting import CastingExecution, read_fields, write_measures, write_picture
@@ -23,27 +24,34 @@ class SolidificationExecution(CastingExecution[Solidification]):
     products = computation.PRODUCTS
 
     def measure(self, run: Run, folder: Path) -> None:
-        """Write the measures against time, those of the whole run in every row, and the picture."""
-        from sandmould.analysis.freezing_plots import draw_freezing
-
+        """Write the measures against time, those of the whole run in every row."""
         series = pd.read_csv(folder / "series.tsv", sep="\t")
         _, _, heat_column = scene.series_columns(run.scenario)
         clock = {"time_s": series["time_s"], "vibration_time_s": math.nan, "stage": "cooling"}
         table = pd.DataFrame({**clock, **series.drop(columns=["time_s", heat_column])})
-        fields, draw = read_fields(folder), None
-        if fields:
-            melts, heat = fields["melts"], series[heat_column]
-            frozen = freezing(
-                fields["position_m"][melts],
-                fields["frozen_s"][melts],
-                run.scenario.hot_spot_reach_m,
-            )
+        if fields := read_fields(folder):
+            heat, frozen = series[heat_column], _frozen(run.scenario, fields)
             table["enthalpy_drift_fraction"] = heat / heat.iloc[0] - 1.0
             table["solidification_time_s"] = frozen.solidification_time_s
             for axis, place_m in zip("xyz", frozen.last_point_m, strict=False):
                 table[f"last_point_{axis}_m"] = place_m
             table["hot_spots"] = len(frozen.hot_spots_m)
-            elements_to_vtk(fields, folder / "fields.vtu")
-            draw = partial(draw_freezing, fields, frozen)
         write_measures(folder, table)
+
+    def export(self, run: Run, folder: Path) -> None:
+        """Draw how the metal froze, and write the fields for ParaView."""
+        from sandmould.analysis.export import elements_to_vtk
+        from sandmould.analysis.freezing_plots import draw_freezing
+
+        fields, draw = read_fields(folder), None
+        if fields:
+            elements_to_vtk(fields, folder / "fields.vtu")
+            draw = partial(draw_freezing, fields, _frozen(run.scenario, fields))
         write_picture(folder, (6, 5), draw)
+
+
+def _frozen(scenario: Solidification, fields: Mapping[str, Any]) -> Freezing:
+    melts = fields["melts"]
+    return freezing(
+        fields["position_m"][melts], fields["frozen_s"][melts], scenario.hot_spot_reach_m
+    )

@@ -29,7 +29,6 @@ from sandmould.runs.outcome import Outcome, RunOutcome
 
 LISTED = 12
 _OF_ANY_COMPUTED = (OLDER_COST, "series.tsv")
-_OF_ANY_MEASURED = ("measures.tsv", LAST_MEASURED)
 
 
 class Need(IntEnum):
@@ -112,7 +111,7 @@ def _lack_of_files(run: Run, folder: Path, manifest: Manifest | None) -> Lack:
     if why:
         return Lack(Need.COMPUTE, why)
     if manifest is None:
-        why = _empty(folder, _OF_ANY_MEASURED)
+        why = _empty(folder, (LAST_MEASURED,))
     elif "measured" not in manifest:
         why = "computed, but its measures are not taken yet"
     else:

@@ -15,6 +15,7 @@ from sandmould.kinds.kind import CORE_SECONDS, SpeedClass
 from sandmould.kinds.registry import kind_of
 from sandmould.plain_file import UNREADABLE
 from sandmould.runs.columns import WALL_S
+from sandmould.runs.manifest import read_cost
 from sandmould.runs.outcome import Outcome, RunOutcome
 from sandmould.study.plan.batches import START_S
 from sandmould.study.plan.fills import beside_s, own_work, predicted_s
@@ -120,9 +121,7 @@ def _class_of(run: Run) -> SpeedClass:
 
 def computed_wall_s(folder: Path) -> float:
     """Wall time that a finished run's computation took; NaN where it failed or none is written."""
-    from sandmould.runs.run_tables import read_costs  # pandas: no start waits for it
-
     with contextlib.suppress(*UNREADABLE):
         if RunOutcome.read(folder / "outcome.json").outcome is Outcome.FINISHED:
-            return float(read_costs([folder]).rows[WALL_S].iloc[-1])
+            return float(read_cost(folder)[WALL_S])
     return math.nan

@@ -16,12 +16,8 @@ from sandmould import ROOT
 from sandmould.definition.run import Run
 from sandmould.engines.snapshot import Snapshot
 from sandmould.execution import records
-from sandmould.kinds.sand.measure import (
-    write_exports,
-    write_measures,
-    write_picture,
-    write_profile,
-)
+from sandmould.kinds.sand.exports import write_exports, write_picture
+from sandmould.kinds.sand.measure import write_measures, write_profile
 from sandmould.study.plan.expand import expand
 from sandmould.study.plan.load_study import open_study
 from sandmould.study.plan.plan_files import read_run
@@ -62,7 +58,7 @@ def test_measures_have_a_row_a_snapshot_and_gaps_for_broken_ones(folder: Path) -
 
 
 def test_exports_are_read_back_by_meshio_and_hold_the_moments(folder: Path) -> None:
-    write_exports(read_run(folder / "scenario.yaml").scenario, folder, folder / "exports")
+    write_exports(read_run(folder / "scenario.yaml").scenario, folder, folder / "exports.zip")
     with zipfile.ZipFile(folder / "exports.zip") as archive:
         names = sorted(archive.namelist())
         archive.extractall(folder / "unpacked")
@@ -89,7 +85,7 @@ def test_picture_of_a_run_without_snapshots_shows_the_scene(folder: Path) -> Non
     for path in (folder / "snapshots").iterdir():
         path.unlink()
     write_picture(read_run(folder / "scenario.yaml").scenario, folder, folder / "final.png")
-    write_exports(read_run(folder / "scenario.yaml").scenario, folder, folder / "exports")
+    write_exports(read_run(folder / "scenario.yaml").scenario, folder, folder / "exports.zip")
     write_measures(read_run(folder / "scenario.yaml").scenario, folder, folder / "measures.tsv")
     assert (folder / "final.png").stat().st_size > 1000
     assert list(pd.read_csv(folder / "measures.tsv", sep="\t").columns)

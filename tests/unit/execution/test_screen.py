@@ -127,7 +127,6 @@ def end(run: str, fill: float, outcome: Outcome = Outcome.FINISHED, wall_s: floa
         f"time_s\tvibration_time_s\tstage\t{FILL}\n1.0\t1.0\tvibrate_1\t{fill}\n"
     )
     (folder / "cost.tsv").write_text(f"wall_s\tcpu_s\n{wall_s}\t{wall_s}\n")
-    (folder / LAST_MEASURED).write_text("")
 
 
 def test_plain_lines_tell_each_run_once(plan: Plan, capsys: pytest.CaptureFixture[str]) -> None:

@@ -43,7 +43,7 @@ def ended(plan: Plan, place: int, outcome: Outcome, wall_s: float) -> None:
     """Let a run end with all that it leaves; it took so long."""
     run = plan.runs[place]
     folder = Path("results/trial/runs") / run.run
-    for name in ("deck.in", "series.tsv", "measures.tsv", "final.png"):
+    for name in ("deck.in", "series.tsv", "measures.tsv"):
         (folder / name).write_text("so\n")
     origin = {"scenario_sha256": scenario_hash(run.scenario),
               "template_sha256": deck_hash(run.scenario)}  # fmt: skip

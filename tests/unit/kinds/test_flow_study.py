@@ -19,7 +19,7 @@ from sandmould.casting.mps.scheme import Scheme
 from sandmould.casting.mps.stability_measures import StabilityRating, by_window, measure_flow
 from sandmould.drawing.animation import ABSENT
 from sandmould.drawing.flow_film import make_flow_film
-from sandmould.execution.simulate import measure_run, render_run, simulate
+from sandmould.execution.simulate import export_run, measure_run, render_run, simulate
 from sandmould.report.flow_charts import _parts, condition_text, said_of, stability_map
 from sandmould.report.kinds.flow import _hopping
 from sandmould.report.page import write_report
@@ -129,6 +129,7 @@ def test_a_study_is_computed_collected_and_reported(
         assert "# Hirata and Anzai 2017, table 1" in deck
         assert simulate(of_run) == 0
         measure_run(of_run)
+        export_run(of_run)
         assert (of_run / "final.png").stat().st_size > 5000
     collect(folder)
     summary = pd.read_csv(folder / "summary.tsv", sep="\t")

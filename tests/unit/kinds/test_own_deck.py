@@ -285,6 +285,7 @@ def test_runs_are_collected_and_reported(tmp_path: Path) -> None:
         )
         (of_run / "cost.tsv").write_text("engine\tversion\tranks\tcpu_s\nlammps\t1\t1\t9\n")
         DECK.execution.measure(run, of_run)
+        DECK.execution.export(run, of_run)
         assert (of_run / "final.png").stat().st_size > 5000
     collect(folder)
     summary = pd.read_csv(folder / "summary.tsv", sep="\t")

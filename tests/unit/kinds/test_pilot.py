@@ -9,7 +9,6 @@ import pandas as pd
 import pytest
 
 from sandmould.bad_input import BadInputError
-from sandmould.kernel_cache import user_cache
 from sandmould.kinds.deck import speed
 from sandmould.study.plan import build_plan
 from sandmould.study.plan.build_plan import (
@@ -20,6 +19,7 @@ from sandmould.study.plan.build_plan import (
     stored_speeds,
 )
 from sandmould.study.plan.price import Prices
+from sandmould.user_cache import user_cache
 
 LAMMPS = ("lammps", 0)
 

@@ -11,7 +11,8 @@ import pytest
 
 from sandmould.definition.run import Run
 from sandmould.kinds.sand.bending import verdict_of
-from sandmould.kinds.sand.measure import write_exports, write_measures
+from sandmould.kinds.sand.bent_files import write_bent
+from sandmould.kinds.sand.measure import write_measures
 from sandmould.pattern_fe.coupling.convergence_log import CONVERGENCE_LOG
 from sandmould.pattern_fe.coupling.foam_body import FoamBody
 from sandmould.pattern_fe.coupling.interface import with_surface
@@ -94,7 +95,7 @@ def test_a_run_without_a_convergence_log_has_its_shape_alone(folder: Path) -> No
 def test_the_bent_pattern_is_written_for_tools_that_measure_shapes(
     folder: Path, body: FoamBody, scenario: Scenario
 ) -> None:
-    write_exports(read_run(folder / "scenario.yaml").scenario, folder, folder / "exports")
+    write_bent(read_run(folder / "scenario.yaml").scenario, folder, folder / "exports")
     names = sorted(p.name for p in (folder / "exports").glob("pattern_*"))
     assert names == ["pattern_filled.stl", "pattern_filled.vtu", "pattern_final.stl",
                      "pattern_final.vtu"]  # fmt: skip

@@ -59,7 +59,7 @@ def test_a_bar_in_space_is_measured_and_written(tmp_path: Path) -> None:
     assert row["pattern_tip_answered_m"] == pytest.approx(row["pattern_tip_deflection_m"])
     assert row["pattern_distance_largest_m"] == pytest.approx(beam_m, rel=0.1)
     assert "pattern_predicted_limit" not in row
-    (out := tmp_path / "exports").mkdir()
+    out = tmp_path / "exports"
     write_bent(scenario, tmp_path, out)
     solid, surface = (meshio.read(out / f"pattern_final.{kind}") for kind in ("stl", "vtu"))
     assert solid.points.min(axis=0) == pytest.approx(snapshot.pattern_m.min(axis=0), abs=1e-7)

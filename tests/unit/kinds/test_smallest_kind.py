@@ -73,8 +73,7 @@ class FallExecution(Execution[Fall]):
     def measure(self, run: Run, folder: Path) -> None:
         table = pd.read_csv(folder / "series.tsv", sep="\t")
         table = table.assign(vibration_time_s=math.nan, stage="falling", fall_s=table["time_s"])
-        table.to_csv(folder / "measures.tsv", sep="\t", index=False)
-        (folder / LAST_MEASURED).write_bytes(b"")
+        table.to_csv(folder / LAST_MEASURED, sep="\t", index=False)
 
 
 def test_the_smallest_kind_is_planned_computed_and_reported(

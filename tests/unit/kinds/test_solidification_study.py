@@ -17,7 +17,7 @@ from PIL import Image
 from sandmould.analysis.freezing import freezing
 from sandmould.bad_input import BadInputError
 from sandmould.casting.arpm import computation
-from sandmould.execution.simulate import measure_run, render_run, simulate
+from sandmould.execution.simulate import export_run, measure_run, render_run, simulate
 from sandmould.report.page import write_report
 from sandmould.runs import checkpoint_file
 from sandmould.runs.checkpoint_file import CheckpointFile
@@ -139,6 +139,7 @@ def test_a_study_is_computed_collected_and_reported(tmp_path: Path) -> None:
         assert "# stand-in: 1440 degrees C, carbon steel" in deck
         assert simulate(of_run) == 0
         measure_run(of_run)
+        export_run(of_run)
         assert (of_run / "final.png").stat().st_size > 5000
     collect(folder)
     summary = pd.read_csv(folder / "summary.tsv", sep="\t")
@@ -276,6 +277,7 @@ def test_a_mesh_is_cast_in_3d_with_a_block_beside_it(tmp_path: Path) -> None:
         cast_m3 = float(fields["volume_m3"][fields["melts"]].sum())
     # the block is 16 cm3, exactly of cells; the corner 40^3/6 mm3, to what its sharp tips lose
     assert cast_m3 - 16e-6 == pytest.approx(0.04**3 / 6, rel=0.01)
+    export_run(folder)
     vtk = meshio.read(folder / "fields.vtu")
     assert [block.type for block in vtk.cells] == ["hexahedron"]
     assert len(vtk.points) == 17**3

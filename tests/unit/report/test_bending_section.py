@@ -12,7 +12,8 @@ import pytest
 
 from sandmould.definition.run import Run
 from sandmould.drawing import figures
-from sandmould.kinds.sand.measure import write_exports, write_measures
+from sandmould.kinds.sand.bent_files import write_bent
+from sandmould.kinds.sand.measure import write_measures
 from sandmould.pattern_fe.coupling.convergence_log import CONVERGENCE_LOG
 from sandmould.pattern_fe.coupling.foam_body import FoamBody
 from sandmould.pattern_fe.coupling.interface import with_surface
@@ -54,7 +55,7 @@ def study(tmp_path_factory: pytest.TempPathFactory) -> Path:
         write_bent_run(run, body, share)
         RunOutcome(Outcome.FINISHED, "", 0.06, 0.06).write(run / "outcome.json")
         write_measures(read_run(run / "scenario.yaml").scenario, run, run / "measures.tsv")
-        write_exports(read_run(run / "scenario.yaml").scenario, run, run / "exports")
+        write_bent(read_run(run / "scenario.yaml").scenario, run, run / "exports")
     return folder
 
 

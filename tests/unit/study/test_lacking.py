@@ -91,8 +91,7 @@ def appended(name: str) -> Callable[[Path], None]:
         (removed("deck.in"), Need.COMPUTE, "deck.in is missing"),
         (appended("deck.in"), Need.COMPUTE, "deck.in was changed by hand"),
         (removed("measures.tsv"), Need.MEASURE, "measures.tsv is missing"),
-        (cut("final.png"), Need.MEASURE, "final.png has "),
-        (removed("fields.vtu"), Need.MEASURE, "fields.vtu is missing"),
+        (cut("measures.tsv"), Need.MEASURE, "measures.tsv has "),
     ],
 )
 def test_damage_is_seen_and_told(
@@ -132,8 +131,8 @@ def test_a_run_of_older_times_needs_its_files_to_be_there(plan: Plan) -> None:
     (folder / MANIFEST_FILE).unlink()
     assert lack(plan) == WHOLE
     assert read_costs([folder]).rows["engine"][0] == tree["cost"]["engine"]
-    (folder / "final.png").write_bytes(b"")
-    assert lack(plan) == Lack(Need.MEASURE, "final.png is missing or empty")
+    (folder / "measures.tsv").write_bytes(b"")
+    assert lack(plan) == Lack(Need.MEASURE, "measures.tsv is missing or empty")
     (folder / "series.tsv").unlink()
     assert lack(plan) == Lack(Need.COMPUTE, "series.tsv is missing or empty")
 
@@ -194,7 +193,7 @@ def test_a_batch_mends_what_is_damaged(plan: Plan) -> None:
     cut("outcome.json")(folder)
     compute_all([folder], folder / "log")
     assert lack(plan) == WHOLE
-    removed("fields.vtu")(folder)
+    removed("measures.tsv")(folder)
     compute_all([folder], folder / "log")
     assert lack(plan) == WHOLE
     assert before == {name: (folder / name).read_text() for name in before}
@@ -202,7 +201,7 @@ def test_a_batch_mends_what_is_damaged(plan: Plan) -> None:
 
 
 FILES = ("outcome.json", MANIFEST_FILE, "deck.in", "series.tsv", "fields.npz", "measures.tsv",
-         "final.png", "scenario.yaml")  # fmt: skip
+         "scenario.yaml")  # fmt: skip
 
 
 def flipped(path: Path) -> None:

@@ -18,7 +18,6 @@ from sandmould.bad_input import BadInputError
 from sandmould.definition.run import RUN_NAME, Run
 from sandmould.engines.durations import REST_AFTER_FALL_S, REST_AFTER_MOTION_S, run_s, stage_s
 from sandmould.engines.program import build_program
-from sandmould.kernel_cache import user_cache
 from sandmould.kinds.sand.planning import SandPlanning
 from sandmould.kinds.sand.speed import SandSpeed
 from sandmould.runs.progress import duration_text
@@ -33,6 +32,7 @@ from sandmould.study.plan.expand import expand
 from sandmould.study.plan.load_study import open_study
 from sandmould.study.plan.plan_files import plan_table, read_run
 from sandmould.study.plan.price import BEGIN_S, END_S, Prices
+from sandmould.user_cache import user_cache
 from tests.planned import write_plan
 
 LAMMPS = ("lammps", 2)

@@ -246,7 +246,7 @@ def test_poured_metal_without_collisions_is_told(tmp_path: Path) -> None:
 def test_what_is_to_be_compiled_is_told_once(
     compiled: bool, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr(notes_of_sand, "are_compiled", lambda room, folder: compiled)
+    monkeypatch.setattr(notes_of_sand, "are_compiled", lambda room: compiled)
     path = tmp_path / "engines.yaml"
     path.write_text(
         yaml.safe_dump(
@@ -269,7 +269,7 @@ def test_what_is_to_be_compiled_is_told_once(
 def test_obstacles_thinner_than_a_grain_are_told(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr(notes_of_sand, "are_compiled", lambda room, folder: True)
+    monkeypatch.setattr(notes_of_sand, "are_compiled", lambda room: True)
 
     def table(thickness_m: float) -> str:
         vertices = [[0.02, 0.02], [0.06, 0.02], [0.06, 0.02 + thickness_m],

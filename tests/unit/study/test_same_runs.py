@@ -158,7 +158,7 @@ def finish(plan: Plan) -> None:
     announce(plan, RESULTS, 1)
     for run in (*plan.runs, *plan.fills):
         folder, planning = RESULTS / plan.study.name / run.place, kind_of(run.scenario).planning
-        for name in ("deck.in", "series.tsv", "measures.tsv", "final.png"):
+        for name in ("deck.in", "series.tsv", "measures.tsv"):
             (folder / name).write_text(f"{name}\n", encoding="utf-8")
         origin = {
             "scenario_sha256": scenario_hash(run.scenario),

@@ -47,23 +47,23 @@ def compute(scenario: OwnDeck, folder: Path, run: str, study: str) -> Computed:
     ----------
     scenario : OwnDeck
     folder : Path
-        The run's; the deck runs in its ``work/output``.
+        The run's, with its deck where that is rendered; it runs in ``work/output``.
     run, study : str
 
     Raises
     ------
     BadInputError
-        When template or files are no longer those of the plan.
+        When its files are no longer those of the plan.
     """
-    check_unchanged(scenario)
     engine, reader = engine_module(scenario.engine.name), deck_reader(scenario.engine.name)
     world = engine.communicator()
     is_root = world is None or world.rank == 0
     work = folder / "work"
-    output = work / OUTPUT
+    output, rendered = work / OUTPUT, folder / _DECK
     candidates = [f"../{path.name}" for path in restarts(scenario, work)] if is_root else []
     if world is not None:
         candidates = world.bcast(candidates)
+    check_unchanged(scenario, is_rendered=not candidates)
     begun, cpu_begun = time.monotonic(), cpu_time_s()
     cost = Cost(scenario.engine.name, scenario.engine.ranks, math.nan, math.nan)
     notes: list[str] = []
@@ -72,7 +72,11 @@ def compute(scenario: OwnDeck, folder: Path, run: str, study: str) -> Computed:
         logs = _logs(work)
         log = work / f"engine_{len(logs) + 1}.log"
         if is_root:
-            _lay_out(scenario, output, render(scenario, run, study, restart), bool(restart))
+            if restart or not rendered.is_file():
+                deck = render(scenario, run, study, restart)
+            else:
+                deck = rendered.read_text(encoding="utf-8")
+            _lay_out(scenario, output, deck, bool(restart))
         if world is not None:
             world.barrier()
         watch = _Watch(log, Progress(run, work, scenario.steps, "steps"), is_root)
@@ -141,9 +145,9 @@ def series(scenario: OwnDeck, work: Path) -> pd.DataFrame:
 
 def restarts(scenario: OwnDeck, work: Path) -> list[Path]:
     """Restart files of an earlier attempt, the newest first."""
-    if "restart" not in names_used(scenario):
-        return []
     files = [work / name for name in RESTART_FILES if (work / name).is_file()]
+    if not files or "restart" not in names_used(scenario):
+        return []
     return sorted(files, key=lambda path: path.stat().st_mtime, reverse=True)
 
 

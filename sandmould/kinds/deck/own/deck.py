@@ -148,14 +148,16 @@ def template_text(scenario: OwnDeck) -> str:
     return path.read_text(encoding="utf-8")
 
 
-def check_unchanged(scenario: OwnDeck) -> None:
-    """See that template and files are those of the plan.
+def check_unchanged(scenario: OwnDeck, is_rendered: bool = False) -> None:
+    """See that files are those of the plan, and the template unless its deck is there.
 
     Raises
     ------
     BadInputError
     """
-    now = with_deck_hash(with_file_hashes(scenario)).sha256
+    now = scenario.sha256 | with_file_hashes(scenario).sha256
+    if not is_rendered:
+        now = with_deck_hash(with_file_hashes(scenario)).sha256
     changed = [n for n, planned in scenario.sha256.items() if now.get(n) != planned]
     if changed:
         valid = "the file as it was planned: plan the study again to run it as it is now"
