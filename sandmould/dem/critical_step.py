@@ -174,13 +174,16 @@ def active_contacts(solver: Solver) -> ActiveContacts:
 
 
 def stable_step(
-    omega_rad_s: float, contacts: ActiveContacts, damped_rate_rad_s: Callable[[Floats], float]
+    omega_rad_s: float,
+    contacts: ActiveContacts,
+    damped_rate_rad_s: Callable[[Floats], float],
+    of_step_s: float | None = None,
 ) -> StableStep:
     """Steps of a frequency and of the rate omega (sqrt(1 + xi^2) + xi) that (42) puts for it.
 
     The rate is that of dashpots, (c,) float64, s. Corrected ones are the weaker the longer the
-    step: their limit is the step that is the limit of its own dashpots, found by secants from that
-    of the plain ones.
+    step: their limit is that of the dashpots of a given step, or the step that is the limit of its
+    own dashpots, found by secants from that of the plain ones.
     """
     if not omega_rad_s > 0.0:
         return StableStep(0.0, math.inf, math.inf)
@@ -189,6 +192,8 @@ def stable_step(
         dashpot = contacts.dashpot / (1.0 + contacts.correction * step_s)
         return 2.0 / damped_rate_rad_s(dashpot) - step_s
 
+    if of_step_s is not None:
+        return StableStep(float(omega_rad_s), 2.0 / omega_rad_s, of_step_s + missed_s(of_step_s))
     damped = 2.0 / damped_rate_rad_s(contacts.dashpot)
     if contacts.correction.any():
         last, missed = damped, missed_s(damped)
@@ -211,10 +216,16 @@ def _largest(matrix: csr_array) -> float:
     return float(largest[0])
 
 
-def whole_step(contacts: ActiveContacts) -> StableStep:
+def whole_step(contacts: ActiveContacts, of_step_s: float | None = None) -> StableStep:
     """Eigenproblem of all grains together.
 
     The damped step is exact for central differences, whether or not the modes are damped alike.
+
+    Parameters
+    ----------
+    contacts : ActiveContacts
+    of_step_s : float, s, optional
+        Step that dashpots are corrected for; by default the limit itself.
     """
     if not len(contacts.first):
         return StableStep(0.0, math.inf, math.inf)
@@ -235,4 +246,4 @@ def whole_step(contacts: ActiveContacts) -> StableStep:
         damping = normal.T @ diags_array(dashpot) @ normal
         return _largest(block_array([[damping, b.T], [b, None]], format="csr"))
 
-    return stable_step(omega, contacts, rate)
+    return stable_step(omega, contacts, rate, of_step_s)

@@ -263,11 +263,11 @@ class ReferenceSession(StagedSession):
         self._loads = dict(means)
         self._restore_stage(stage)
 
-    def exact_limit_s(self) -> float:
+    def exact_limit_s(self, of_step_s: float | None = None) -> float:
         """Limit of all contacts; sparse matrices are loaded for runs that ask for it alone."""
         from sandmould.dem.critical_step import active_contacts, whole_step
 
-        return whole_step(active_contacts(self.solver)).damped_s
+        return whole_step(active_contacts(self.solver), of_step_s).damped_s
 
     def _save(self, folder: Path) -> None:
         """Write the solver's state, of which nothing is lost."""
