@@ -23,6 +23,8 @@ from sandmould.scenario.scenario import Scenario
 
 _KEEP_BED = "#--- block: keep_bed ---"
 """Where the second part begins."""
+_COUNT_ON = "count_on"
+"""Block of the second part alone that belongs to its setup."""
 _NUMBER = re.compile(r"^variable (\w+) index (\S+)", re.M)
 
 
@@ -108,6 +110,12 @@ def _given_anew(text: str, earlier: str) -> str:
 
 
 def blocks_of(deck: Deck, scenario: Scenario) -> dict[str, DeckBlock]:
-    """Blocks of the part of a deck that a session computes."""
-    first, _, second = deck.text.partition(_KEEP_BED)
-    return Deck(second if second and scenario.has_step_of_bed else first).blocks
+    """Blocks of the part of a deck that a session computes.
+
+    Before the bed has given its step they are those of the fill, and stages after it that have the
+    planned step too, for a session that goes on by itself.
+    """
+    first, second = (Deck(part).blocks for part in deck.text.partition(_KEEP_BED)[::2])
+    if scenario.has_step_of_bed:
+        return second or first
+    return first | {name: second[name] for name in second if name not in {*first, _COUNT_ON}}

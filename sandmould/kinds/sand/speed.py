@@ -39,7 +39,7 @@ class SandSpeed(StoredSpeed[Scenario]):
         seconds of this machine take them. In 3D, where runs fill for as long as they shake, and
         shaken spheres lose more of their contacts, both are timed.
         """
-        shaken, planned = scenario.vibrations, {"step_s": None, "bed_fraction": None}
+        shaken = scenario.vibrations
         trial = scenario.model_copy(
             update={
                 "fill": Fill(layers=(Layer(count=GRAINS),), settling=Settling(longest_s=LONG_S)),
@@ -47,7 +47,6 @@ class SandSpeed(StoredSpeed[Scenario]):
                 "pattern": None,
                 "vibration": tuple(s.model_copy(update={"duration_s": LONG_S}) for s in shaken[:1]),
                 "engine": scenario.engine.model_copy(update={"ranks": 1}),
-                "time_step": scenario.time_step.model_copy(update=planned),
             }
         )
         program = build_program(trial)

@@ -14,6 +14,7 @@ from sandmould.engines.durations import cost_before, stage_s
 from sandmould.engines.program import build_program
 from sandmould.engines.reference.session import ReferenceSession
 from sandmould.engines.session import EngineStop
+from sandmould.scenario.reading import Origin, merge
 from sandmould.scenario.scenario import Scenario
 from sandmould.scenario.time_step import damped_step
 from tests.scenes import TUBE_SCENE, tube_scene
@@ -109,8 +110,12 @@ def test_a_step_of_the_users_own_waits_for_the_bed_and_keeps_below_its_limit() -
 @pytest.mark.parametrize("change", [{"vibration": []}, {"time_step": {"step_s": 1e-5}}])
 def test_the_step_of_the_bed_is_taken_where_there_is_one(change: dict[str, Any]) -> None:
     tree = {key: value for key, value in TUBE_SCENE.items() if key != "time_step"}
-    assert Scenario.model_validate(tree).time_step.bed_fraction == 0.7
-    assert Scenario.model_validate(tree | change).time_step.bed_fraction is None
+    scene = Scenario.model_validate(tree)
+    assert scene.time_step.bed_fraction == 0.7
+    changed = Scenario.model_validate(merge(tree, change, Origin(), "test"))
+    assert not changed.takes_step_of_bed
+    # the fill of a scene that is shaken is one of its own
+    assert Scenario.model_validate(scene.before_vibration.model_dump()).takes_step_of_bed
 
 
 def test_a_limit_below_the_step_is_told() -> None:
