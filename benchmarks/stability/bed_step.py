@@ -1,4 +1,4 @@
-"""Paired fillings: does the step of the bed change what a filled and shaken box is asked?"""
+"""Paired fillings: whether the step of the bed changes what is asked of a filled and shaken box."""
 
 from __future__ import annotations
 
@@ -17,6 +17,8 @@ from sandmould.study.collect import read_summary
 MARGINS = {"solid_fraction": 0.005, "tube_fill_fraction": 0.03}
 TIMES = (8, 16, 24, 32)
 """Fillings, of which there are more until the intervals lie inside the margins."""
+
+
 def _shaken(g: float, frequency_hz: float, duration_s: float) -> list[dict[str, Any]]:
     return [{"acceleration_g": g, "frequency_hz": frequency_hz, "duration_s": duration_s}]
 

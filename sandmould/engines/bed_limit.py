@@ -17,11 +17,7 @@ from sandmould.scenario.time_step import inertia_factor
 
 
 def limit_of_snapshot_s(
-    scenario: Scenario,
-    stage: Stage,
-    snapshot: Snapshot,
-    opened: Iterable[str],
-    of_step_s: float | None = None,
+    scenario: Scenario, stage: Stage, snapshot: Snapshot, opened: Iterable[str]
 ) -> float:
     """Find the step up to which the contacts of a snapshot stay bounded.
 
@@ -34,8 +30,6 @@ def limit_of_snapshot_s(
     snapshot : Snapshot
     opened : iterable of str
         Plates that were taken away.
-    of_step_s : float, s, optional
-        Step that dashpots are corrected for; by default the limit itself.
 
     Returns
     -------
@@ -61,4 +55,5 @@ def limit_of_snapshot_s(
     for gate in opened:
         solver.remove_surface(gate)
     solver.place(snapshot.position_m, still, unturned)
+    of_step_s = scenario.step_s if scenario.has_step_of_bed else None
     return whole_step(active_contacts(solver), of_step_s).damped_s

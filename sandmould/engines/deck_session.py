@@ -80,7 +80,7 @@ class DeckSession(StagedSession):
         if after is not None:
             self.send(after.text)
 
-    def exact_limit_s(self, of_step_s: float | None = None) -> float:
+    def exact_limit_s(self) -> float:
         """Limit of our own solver's contacts where the engine's grains are."""
         snapshot = self.snapshot()  # all ranks take part in gathering
         limit_s = math.inf
@@ -88,9 +88,7 @@ class DeckSession(StagedSession):
             # Compiled code takes a while to load: only runs that ask for it wait.
             from sandmould.engines.bed_limit import limit_of_snapshot_s
 
-            limit_s = limit_of_snapshot_s(
-                self._scenario, self.stage, snapshot, self._opened, of_step_s
-            )
+            limit_s = limit_of_snapshot_s(self._scenario, self.stage, snapshot, self._opened)
         return self.share(limit_s)
 
     def _save(self, folder: Path) -> None:

@@ -310,7 +310,7 @@ class Driver:
             if moment > now:
                 self._advance(session, (moment - now) * step_s)
                 now = moment
-            limit_s, least_s = session.exact_limit_s(step_s), cost.least_limit_s
+            limit_s, least_s = session.exact_limit_s(), cost.least_limit_s
             cost.least_limit_s = limit_s if least_s is None else min(limit_s, least_s)
             cost.limit_moments += 1
 

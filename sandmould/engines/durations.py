@@ -32,8 +32,8 @@ REST_AFTER_MOTION_S = 0.1
 """Guess of the time a bed needs to come to rest once box or piston stands: 0.06 to 0.12 s on
 average in each of seven studies of hard sand in 2D and 3D, 0.17 s in one of soft sand."""
 LIMIT_OF_BED = 1.2
-"""Guess of the exact limit of a filled bed over the planned critical step: 1.0 to 1.5 in beds of 500
-to 8 000 grains, the less the more grains, the more equal and the smoother they are."""
+"""Guess of the exact limit of a filled bed over the planned critical step: 1.0 to 1.5 in beds of
+500 to 8 000 grains, the less the more grains, the more equal and the smoother they are."""
 
 
 def stage_s(program: Program, stage: Stage) -> float:
@@ -77,9 +77,7 @@ def stage_steps(program: Program) -> list[float]:
 def grain_steps(program: Program, first_stage: int = 0) -> float:
     """Sum over stages of grains present times steps, from a stage on."""
     total, grains = 0.0, 0
-    for number, (stage, steps) in enumerate(
-        zip(program.stages, stage_steps(program), strict=True)
-    ):
+    for number, (stage, steps) in enumerate(zip(program.stages, stage_steps(program), strict=True)):
         grains += program.counts[stage.layer - 1] if stage.layer else 0
         if number >= first_stage:
             total += grains * steps

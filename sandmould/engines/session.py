@@ -173,13 +173,10 @@ class Session(Protocol):
     def table_periods(self) -> list[TablePeriod]:
         """Give the periods of a vibration on mounts that have ended since the last asking."""
 
-    def exact_limit_s(self, of_step_s: float | None = None) -> float:
+    def exact_limit_s(self) -> float:
         """Find the step up to which the contacts of this moment stay bounded.
 
-        Parameters
-        ----------
-        of_step_s : float, s, optional
-            Step that dashpots are corrected for; by default the limit itself.
+        Dashpots are corrected for the limit itself; once the bed has given the step, for that.
 
         Returns
         -------

@@ -42,9 +42,10 @@ class TimeStep(Section):
 BED_FRACTION = 0.7
 """Unless given; it leaves room for a bed that vibration packs."""
 CONTACTS = 6.0
-"""Of a grain in the lattice whose limit is planned: that of hexagonal discs, and the least that holds
-spheres without friction. Filled and filling beds had the limit of 4.0 to 5.2 (discs) and 3.6 to 5.6
-contacts (spheres), fewer the wider their sizes are spread, and of 5.8 without friction."""
+"""Of a grain in the lattice whose limit is planned: that of hexagonal discs, and the least that
+holds spheres without friction. Beds, filled and filling, had the limit of 4.0 to 5.2 (discs) and
+3.6 to 5.6 contacts (spheres), fewer the wider their sizes are spread, and of 5.8 without
+friction."""
 LEAST_STEPS_A_PERIOD = 20
 """Time steps of a period of vibration."""
 

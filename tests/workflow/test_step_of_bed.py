@@ -132,9 +132,9 @@ def test_a_run_whose_bed_becomes_too_stiff_begins_again_from_its_fill(
 ) -> None:
     found = ReferenceSession.exact_limit_s
 
-    def shrinks(session: ReferenceSession, of_step_s: float | None = None) -> float:
+    def shrinks(session: ReferenceSession) -> float:
         stiff = session.step_s > 2.5e-5 and session.stage.counts_as_vibration
-        return found(session, of_step_s) * (0.6 if stiff else 1.0)
+        return found(session) * (0.6 if stiff else 1.0)
 
     monkeypatch.setattr(ReferenceSession, "exact_limit_s", shrinks)
     if shared:
@@ -159,8 +159,8 @@ def test_a_run_whose_bed_becomes_too_stiff_begins_again_from_its_fill(
 def test_a_bed_that_is_too_stiff_again_and_again_is_told(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    def limit_s(session: ReferenceSession, of_step_s: float | None = None) -> float:
-        return 4e-5 if of_step_s is None else 0.99 * of_step_s
+    def limit_s(session: ReferenceSession) -> float:
+        return 0.99 * session.step_s if session.stage.counts_as_vibration else 4e-5
 
     monkeypatch.setattr(ReferenceSession, "exact_limit_s", limit_s)
     folder = run_folder(tube_scene(**OF_BED), tmp_path)

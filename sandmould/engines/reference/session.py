@@ -263,10 +263,11 @@ class ReferenceSession(StagedSession):
         self._loads = dict(means)
         self._restore_stage(stage)
 
-    def exact_limit_s(self, of_step_s: float | None = None) -> float:
+    def exact_limit_s(self) -> float:
         """Limit of all contacts; sparse matrices are loaded for runs that ask for it alone."""
         from sandmould.dem.critical_step import active_contacts, whole_step
 
+        of_step_s = self.step_s if self._scenario.has_step_of_bed else None
         return whole_step(active_contacts(self.solver), of_step_s).damped_s
 
     def _save(self, folder: Path) -> None:

@@ -196,7 +196,8 @@ class SandPlanning(Planning[Scenario]):
     def plan_cells(self, scenario: Scenario) -> Mapping[str, str]:
         """Grains, time step and steps."""
         step_s, shaken_s = scenario.step_s, shaken_step_s(scenario)
-        then = f", then about {shaken_s:.2g} s" if scenario.vibrations and shaken_s != step_s else ""
+        changes = bool(scenario.vibrations) and shaken_s != step_s
+        then = f", then about {shaken_s:.2g} s" if changes else ""
         return {
             "grains": f"{sum(plan_counts(scenario)):,}",
             "time step": f"{step_s:.3g} s{then}",
