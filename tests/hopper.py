@@ -70,6 +70,7 @@ HOPPER: dict[str, Any] = {
         {"acceleration_g": 3.0, "frequency_hz": 20.0, "duration_s": 0.15, "direction": "horizontal"}
     ],
     "record": {"snapshot_every_s": 0.02, "checkpoint_every_s": 0.04},
+    "time_step": {"bed_fraction": 0.0},
 }  # fmt: skip
 """What all engines can compute: no background damping, discs that turn as spheres do."""
 

@@ -30,8 +30,10 @@ TUBE_SCENE: dict[str, Any] = {
     "fill": {"layers": [{"count": 60, "repeat": 2}]},
     "vibration": [{"acceleration_g": 1.5, "frequency_hz": 50.0, "duration_s": 0.06}],
     "record": {"snapshot_every_s": 0.02},
+    "time_step": {"bed_fraction": 0.0},
 }
-"""About the smallest scene in which sand flows into a tube; soft, for the length of its step."""
+"""About the smallest scene in which sand flows into a tube; soft, for the length of its step, which
+is one from beginning to end."""
 
 
 def tube_scene(**changes: Any) -> Scenario:

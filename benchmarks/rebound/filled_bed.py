@@ -35,8 +35,10 @@ MARGINS = {
 def _scenario(dashpot: str, fraction: float, seed: int) -> Scenario:
     base = expand(open_study(STUDY))[0].scenario
     changes = CHANGES | {
-        "contact": {"dashpot": dashpot}, "time_step": {"fraction": fraction}, "seed": seed
-    }  # fmt: skip
+        "contact": {"dashpot": dashpot},
+        "time_step": {"fraction": fraction, "bed_fraction": 0},
+        "seed": seed,
+    }
     return Scenario.model_validate(
         merge(base.model_dump(exclude_none=True), changes, Origin(), "filled bed")
     )

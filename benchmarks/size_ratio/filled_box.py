@@ -25,6 +25,7 @@ CHANGES: dict[str, Any] = {
         law: {f"{which}_stiffness_n_m": SPRING_N_M for which in ("normal", "tangential", "rolling")}
         for law in ("grain_grain", "grain_wall")
     },
+    "time_step": {"bed_fraction": 0},
     "vibration": [{"frequency_hz": 50, "acceleration_g": 1.5, "duration_s": 0.2}],
 }
 PLANES = ("half_step", "full_step")

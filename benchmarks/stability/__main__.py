@@ -10,6 +10,8 @@ from functools import partial
 from typing import Any
 
 from benchmarks.frame import Benchmark, BenchmarkRun
+from benchmarks.stability.bed_step import SCENES as FILLED
+from benchmarks.stability.bed_step import paired_fillings
 from benchmarks.stability.limits import (
     COARSE,
     WHOLE,
@@ -59,6 +61,9 @@ BENCHMARK = Benchmark(
         "scenes": scenes,
         "bed_followed": lambda run: followed_beds(engines_here(), run.extent),
         "rotation": lambda run: rotation(run.extent),
+        "fillings": lambda run: [
+            run.parts.get(scene, partial(paired_fillings, scene)) for scene in FILLED
+        ],
     },
     pages={"stability.md": page, "developers/longer_steps.md": longer_steps},
     draw=draw,

@@ -7,9 +7,9 @@ mode, C = 2 xi omega M and K = omega^2 M, this is eq. (42). For a system it is, 
 
     (4 s^2 M - 2 s C - K) phi = 0,
 
-whose largest s is that of a symmetric matrix: for K = B^T B, b = B M^-1/2 and c = M^-1/2 C M^-1/2
-
-    s [u, w] = 1/2 [[c, b^T], [b, 0]] [u, w].
+whose largest s is the largest that a phi has by phi^T (4 s^2 M - 2 s C - K) phi = 0. For K = B^T B,
+b = B M^-1/2 and c = M^-1/2 C M^-1/2 the phi of the largest eigenvalue of 2 s c + b^T b has a larger
+one than s, until both are the same.
 
 All contacts count as sticking unless they are smooth, and none opens: the stiffest case. The turn
 of the normals under the contact forces is left out, of the order of the overlap over the radius.
@@ -23,7 +23,7 @@ from dataclasses import dataclass
 from typing import NamedTuple
 
 import numpy as np
-from scipy.sparse import block_array, coo_array, csr_array, diags_array
+from scipy.sparse import coo_array, csr_array, diags_array
 from scipy.sparse.linalg import eigsh
 
 from sandmould.dem.contact_law import Law
@@ -31,7 +31,7 @@ from sandmould.dem.grains import Floats, Ints
 from sandmould.dem.solver import Solver
 
 _SETTLED = 1e-9
-"""Relative change of the step of corrected dashpots below which it has been found."""
+"""Relative change of the step below which it has been found."""
 
 
 @dataclass(frozen=True)
@@ -174,13 +174,16 @@ def active_contacts(solver: Solver) -> ActiveContacts:
 
 
 def stable_step(
-    omega_rad_s: float, contacts: ActiveContacts, damped_rate_rad_s: Callable[[Floats], float]
+    omega_rad_s: float,
+    contacts: ActiveContacts,
+    damped_rate_rad_s: Callable[[Floats], float],
+    of_step_s: float | None = None,
 ) -> StableStep:
     """Steps of a frequency and of the rate omega (sqrt(1 + xi^2) + xi) that (42) puts for it.
 
     The rate is that of dashpots, (c,) float64, s. Corrected ones are the weaker the longer the
-    step: their limit is the step that is the limit of its own dashpots, found by secants from that
-    of the plain ones.
+    step: their limit is that of the dashpots of a given step, or the step that is the limit of its
+    own dashpots, found by secants from that of the plain ones.
     """
     if not omega_rad_s > 0.0:
         return StableStep(0.0, math.inf, math.inf)
@@ -189,6 +192,8 @@ def stable_step(
         dashpot = contacts.dashpot / (1.0 + contacts.correction * step_s)
         return 2.0 / damped_rate_rad_s(dashpot) - step_s
 
+    if of_step_s is not None:
+        return StableStep(float(omega_rad_s), 2.0 / omega_rad_s, of_step_s + missed_s(of_step_s))
     damped = 2.0 / damped_rate_rad_s(contacts.dashpot)
     if contacts.correction.any():
         last, missed = damped, missed_s(damped)
@@ -199,22 +204,25 @@ def stable_step(
     return StableStep(float(omega_rad_s), 2.0 / omega_rad_s, damped)
 
 
-def _largest(matrix: csr_array) -> float:
-    """Largest eigenvalue of a symmetric matrix."""
-    n = matrix.shape[0]
-    if n < 200:
-        return float(np.linalg.eigvalsh(matrix.toarray())[-1])
-    # A start of no symmetry, always the same.
-    start = np.random.default_rng(1).standard_normal(n)
-    # The error of the eigenvalue is the square of that of the vector, which the tolerance bounds.
-    largest = eigsh(matrix, k=1, which="LA", v0=start, tol=1e-8, return_eigenvectors=False)
-    return float(largest[0])
+def _stiffest(matrix: csr_array, start: Floats) -> Floats:
+    """Eigenvector of the largest eigenvalue of a symmetric matrix, searched from a start."""
+    if len(start) < 200:
+        return np.asarray(np.linalg.eigh(matrix.toarray())[1][:, -1])
+    # The error of the step is the square of that of the vector, which the tolerance bounds.
+    _, vectors = eigsh(matrix, k=1, which="LA", v0=start, tol=1e-5)
+    return np.asarray(vectors[:, 0])
 
 
-def whole_step(contacts: ActiveContacts) -> StableStep:
+def whole_step(contacts: ActiveContacts, of_step_s: float | None = None) -> StableStep:
     """Eigenproblem of all grains together.
 
     The damped step is exact for central differences, whether or not the modes are damped alike.
+
+    Parameters
+    ----------
+    contacts : ActiveContacts
+    of_step_s : float, s, optional
+        Step that dashpots are corrected for; by default the limit itself.
     """
     if not len(contacts.first):
         return StableStep(0.0, math.inf, math.inf)
@@ -228,11 +236,25 @@ def whole_step(contacts: ActiveContacts) -> StableStep:
     b = coo_array(
         (values.ravel(), (row.ravel(), column.ravel())), shape=(c * r, contacts.grains * f)
     ).tocsr()
-    omega = math.sqrt(_largest(b.T @ b))
-    normal = b[::r]
+    stiffness, normal = (b.T @ b).tocsr(), b[::r]
+    # A start of no symmetry, always the same.
+    motion = np.random.default_rng(1).standard_normal(contacts.grains * f)
+    motion = _stiffest(stiffness, motion)
+    omega = math.sqrt(motion @ stiffness @ motion)
 
     def rate(dashpot: Floats) -> float:
-        damping = normal.T @ diags_array(dashpot) @ normal
-        return _largest(block_array([[damping, b.T], [b, None]], format="csr"))
+        nonlocal motion
+        damping = (normal.T @ diags_array(dashpot) @ normal).tocsr()
+        last, found = 0.0, _rate(motion, damping, stiffness)
+        while found - last > _SETTLED * found:
+            motion = _stiffest(found * damping + stiffness, motion)
+            last, found = found, _rate(motion, damping, stiffness)
+        return found
 
-    return stable_step(omega, contacts, rate)
+    return stable_step(omega, contacts, rate, of_step_s)
+
+
+def _rate(motion: Floats, damping: csr_array, stiffness: csr_array) -> float:
+    """Rate 2 s of a motion of length 1: omega (sqrt(1 + xi^2) + xi)."""
+    c, k = motion @ damping @ motion, motion @ stiffness @ motion
+    return float(0.5 * (c + math.sqrt(c * c + 4.0 * k)))

@@ -23,32 +23,35 @@ from sandmould.scenario.scenario import Scenario
 
 _KEEP_BED = "#--- block: keep_bed ---"
 """Where the second part begins."""
+_COUNT_ON = "count_on"
+"""Block of the second part alone that belongs to its setup."""
 _NUMBER = re.compile(r"^variable (\w+) index (\S+)", re.M)
-
-
-def follows_bed(scenario: Scenario) -> bool:
-    """Whether a scene has got the step of its filled bed."""
-    return scenario.time_step.bed_fraction is not None and scenario.time_step.step_s is not None
 
 
 def sources_of_step(scenario: Scenario) -> list[list[Path]]:
     """Files of ours that find the step of a bed that another engine computes; none without one."""
-    if scenario.time_step.bed_fraction is None:
+    if not scenario.takes_step_of_bed:
         return []
     here = Path(__file__).parent
     names = ("bed_deck.py", "bed_limit.py", "solid_surfaces.py", "reference/model.py")
     return [source_files(), [here / name for name in names]]
 
 
+def step_meaning(scenario: Scenario) -> str:
+    """What the step of a filled bed is."""
+    fraction = scenario.time_step.bed_fraction
+    share = f"{fraction:.3g} of the exact limit of the filled bed" if fraction else "as given"
+    return f"time step after the fill, {share}, rounded down"
+
+
 def step_line(lines: Lines) -> str:
     """The time step of a deck, or of a part of it, as its variable."""
     scenario, source = lines.scenario, lines.source("time_step.fraction")
-    critical, fraction = scenario.critical_step, scenario.time_step.bed_fraction
-    if fraction is not None and follows_bed(scenario):
-        meaning = f"time step after the fill, {fraction:g} of the exact limit of the filled bed"
+    critical = scenario.critical_step
+    if scenario.has_step_of_bed:
         of_bed = f"eqs. (40)-(54) of all its contacts; {lines.source('time_step.bed_fraction')}"
-        return lines.number("time_step", scenario.step_s, "s", f"{meaning}, rounded down", of_bed)
-    meaning = "time step" if fraction is None else "time step of the fill"
+        return lines.number("time_step", scenario.step_s, "s", step_meaning(scenario), of_bed)
+    meaning = "time step of the fill" if scenario.takes_step_of_bed else "time step"
     share = f"{scenario.step_s / critical.step_s:.3g} of the critical {critical.step_s:.4g} s"
     return lines.number(
         "time_step", scenario.step_s, "s", f"{meaning}, {share} set by {critical.cause}",
@@ -71,7 +74,7 @@ def render_parts(
         Names and values for the templates, of a program.
     """
     scenario, filled = program.scenario, program.fill_stages
-    if scenario.time_step.bed_fraction is None or filled == len(program.stages):
+    if not scenario.takes_step_of_bed or filled == len(program.stages):
         return Deck.render(dialect, context_of(program))
     planned = scenario.time_step.model_copy(update={"step_s": None})
     fill = replace(program, scenario=scenario.model_copy(update={"time_step": planned}))
@@ -79,7 +82,7 @@ def render_parts(
         dialect, context_of(fill) | {"stages": program.stages[:filled]}, "start.in.j2"
     )
     shaken = program
-    if not follows_bed(scenario):
+    if not scenario.has_step_of_bed:
         shaken = build_program(with_bed_step(scenario, math.inf))
     parts = {"fill_stages": program.stages[:filled], "stages": shaken.stages[filled:]}
     second = Deck.render(dialect, context_of(shaken) | parts, "bed.in.j2")
@@ -107,6 +110,12 @@ def _given_anew(text: str, earlier: str) -> str:
 
 
 def blocks_of(deck: Deck, scenario: Scenario) -> dict[str, DeckBlock]:
-    """Blocks of the part of a deck that a session computes."""
-    first, _, second = deck.text.partition(_KEEP_BED)
-    return Deck(second if second and follows_bed(scenario) else first).blocks
+    """Blocks of the part of a deck that a session computes.
+
+    Before the bed has given its step they are those of the fill, and stages after it that have the
+    planned step too, for a session that goes on by itself.
+    """
+    first, second = (Deck(part).blocks for part in deck.text.partition(_KEEP_BED)[::2])
+    if scenario.has_step_of_bed:
+        return second or first
+    return first | {name: second[name] for name in second if name not in {*first, _COUNT_ON}}

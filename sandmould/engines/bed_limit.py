@@ -55,4 +55,5 @@ def limit_of_snapshot_s(
     for gate in opened:
         solver.remove_surface(gate)
     solver.place(snapshot.position_m, still, unturned)
-    return whole_step(active_contacts(solver)).damped_s
+    of_step_s = scenario.step_s if scenario.has_step_of_bed else None
+    return whole_step(active_contacts(solver), of_step_s).damped_s

@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from typing import Any
 
-from sandmould.engines.bed_deck import follows_bed, step_line
+from sandmould.engines.bed_deck import step_line
 from sandmould.engines.deck import remark
 from sandmould.engines.deck_lines import (
     SKIN,
@@ -61,7 +61,7 @@ def deck_context(program: Program, lines: Lines, run: str, study: str) -> dict[s
         "scenario": scenario,
         "program": program,
         "stages": program.stages,
-        "after_bed": follows_bed(scenario),
+        "after_bed": scenario.has_step_of_bed,
         "classes": classes,
         "clip": scenario.contact.no_tension == "total",
         "damping": scenario.background_damping,

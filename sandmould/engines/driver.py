@@ -4,12 +4,13 @@ from __future__ import annotations
 
 import errno
 import signal
+import sys
 import time
 from collections.abc import Callable
 from pathlib import Path
 from types import FrameType
 
-from sandmould.engines.bed_step import limit_moments, limit_warning, with_bed_step
+from sandmould.engines.bed_step import MOST_AGAIN, limit_moments, limit_notes, with_bed_step
 from sandmould.engines.blockage import what_blocks
 from sandmould.engines.durations import cost_before, grain_steps, run_s
 from sandmould.engines.guard import Guard
@@ -137,14 +138,13 @@ class Driver:
                 raise
             where = f": {error.filename}" if error.filename else ""
             outcome, detail = Outcome.DISK_REFUSED, f"{error.strerror}{where}"
-        warning = limit_warning(self.cost.time_step_s, self.cost.least_limit_s)
-        detail = "; ".join(said for said in (detail, warning, *notes) if said)
+        detail = "; ".join(said for said in (detail, *limit_notes(self.cost), *notes) if said)
         return RunOutcome(outcome, detail, self._simulated_s, run_s(self._program))
 
     def _go_on(self, newest: tuple[Path, CheckpointMark] | None) -> bool:
         """Compute in a session from a checkpoint, or from the beginning; whether the run has ended.
 
-        It has not where the filled bed has given another step, with which the next session goes on.
+        It has not where the bed has given another step, with which the next session goes on.
         """
         mark = newest[1] if newest else None
         if mark is not None and mark.bed_limit_s is not None:
@@ -161,16 +161,21 @@ class Driver:
             )
             self.is_root = session.is_root
             if session.is_root:
+                if newest is not None and mark is not None and self._at_end_of_fill(mark):
+                    checkpoints.keep_filled(self._work, newest)
                 self._recorder = Recorder(self._work, self._scenario.dimension, mark)
             return self._go(session, mark)
         finally:
             self._end(session)
 
     def _expected_grain_steps(self) -> float:
-        """Work of this run: the fill, where it does not share it, has the planned step."""
-        filled, planned = self._program.fill_stages, self._planned
-        own_fill = grain_steps(planned, self._shared_stages) - grain_steps(planned, filled)
-        return own_fill + grain_steps(self._program, max(filled, self._shared_stages))
+        """Work of this run: all but that of a fill that it shares."""
+        return grain_steps(self._program, self._shared_stages)
+
+    def _at_end_of_fill(self, mark: CheckpointMark) -> bool:
+        """Whether a checkpoint is where the filled bed has given its step."""
+        end = self._program.stages[self._program.fill_stages - 1]
+        return mark.bed_limit_s is not None and mark.stage == end.name
 
     def _ask_to_stop(self, number: int, frame: FrameType | None) -> None:
         self._stop_requested = True
@@ -202,12 +207,16 @@ class Driver:
                 self._begin_stage(session, stage)
             self._guard.start_stage(stage, session.snapshot())
             while not session.stage_over:
-                self._window(session)
+                if not self._window(session):
+                    return False
             self._check_rest(session, stage)
-            finds_limit = number + 1 == self._program.fill_stages and self._lacks_bed_limit
+            ends_fill = self._keeps_end and stage is self._program.stages[-1]
+            finds_limit = self._lacks_bed_limit and (
+                ends_fill or number + 1 == self._program.fill_stages < len(self._program.stages)
+            )
             if finds_limit:
                 self.cost.bed_limit_s = self._bed_limit_s = session.exact_limit_s()
-            if self._keeps_end and stage is self._program.stages[-1]:
+            if ends_fill:
                 self._write_end(session)
             elif finds_limit:
                 self._write_next(session)
@@ -221,7 +230,7 @@ class Driver:
     @property
     def _lacks_bed_limit(self) -> bool:
         """Whether the run takes its step from the filled bed and has not found its limit yet."""
-        return self._scenario.time_step.bed_fraction is not None and self._bed_limit_s is None
+        return self._scenario.takes_step_of_bed and self._bed_limit_s is None
 
     def _check_rest(self, session: Session, stage: Stage) -> None:
         """Stop where the sand did not come to rest, or came to rest before it had flowed out."""
@@ -251,11 +260,16 @@ class Driver:
         ) and self._recorder is not None:
             self._recorder.save(snapshot)
 
-    def _window(self, session: Session) -> None:
-        """Compute up to the next check, look at it, and record it where a record is due."""
+    def _window(self, session: Session) -> bool:
+        """Compute up to the next check, look at it, and record it where a record is due.
+
+        False where the bed has become too stiff for the step.
+        """
         before, cost = session.steps, self.cost
         if session.stage.counts_as_vibration and cost.limit_moments < len(self._moments):
             self._find_limits(session)
+            if self._begins_again(session):
+                return False
         self._advance(session)
         self._simulated_s = session.time_s
         cost.grains = session.grains
@@ -278,6 +292,7 @@ class Driver:
             self._show(session)
         if ended_record:
             self._checkpoint_if_due(session)
+        return True
 
     def _advance(self, session: Session, duration_s: float | None = None) -> None:
         began = time.monotonic()
@@ -298,6 +313,22 @@ class Driver:
             limit_s, least_s = session.exact_limit_s(), cost.least_limit_s
             cost.least_limit_s = limit_s if least_s is None else min(limit_s, least_s)
             cost.limit_moments += 1
+
+    def _begins_again(self, session: Session) -> bool:
+        """Go back to the end of the fill where the limit fell below a step taken from the bed."""
+        cost, least_s = self.cost, self.cost.least_limit_s
+        own = not self._planned.scenario.time_step.bed_fraction
+        stays = least_s is None or least_s >= session.step_s or own
+        if least_s is None or stays or cost.begun_again == MOST_AGAIN:
+            return False
+        cost.begun_again += 1
+        cost.least_limit_s, cost.limit_moments = None, 0
+        if session.is_root:
+            why = f"the limit of the shaken bed fell to {least_s:.4g} s, below its time step"
+            print(f"{self._name}: {why}; it begins again from its fill", file=sys.stderr)
+            checkpoints.begin_again(self._work, least_s, cost.row())
+        session.share(None)  # no rank looks for the checkpoint before it is sealed
+        return True
 
     def _show(self, session: Session, last: bool = False) -> None:
         rate = self.cost.grain_steps / max(self.cost.engine_wall_s, 1e-9)

@@ -176,6 +176,8 @@ class Session(Protocol):
     def exact_limit_s(self) -> float:
         """Find the step up to which the contacts of this moment stay bounded.
 
+        Dashpots are corrected for the limit itself; once the bed has given the step, for that.
+
         Returns
         -------
         float, s

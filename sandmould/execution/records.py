@@ -50,13 +50,13 @@ from sandmould.study.rounds.round_log import ROUNDS_FILE, read_rounds
 OVER_TIME = "over_time.tsv"
 TIMES = 8
 """Moments of the vibration, equally far apart, at which a record keeps what the study judges."""
-DEFAULTS = 3
+DEFAULTS = 4
 """Which set of defaults records are computed with; a record without the number has the first. The
 second: rest is decided by checks of its own, sand rests after vibration before it is measured, and
 castings have the drawing's volume and area. The third: dashpots make up for the half step by
 which they see the velocity late, in 3D the reference engine takes the slip of two grains in the
 plane of the normal of half a step ago, discs are as thick as a grain is wide, and springs grow with
-the grains."""
+the grains. The fourth: the filled bed gives the step of what follows."""
 OLD_DEFAULTS = "old defaults"
 OLDER_SOLVER = "older solver"
 """Of a record: its scenarios are those of today, what computes them has changed since. It counts

@@ -3,8 +3,9 @@
 from __future__ import annotations
 
 import json
+import os
 import shutil
-from dataclasses import asdict, dataclass
+from dataclasses import asdict, dataclass, replace
 from pathlib import Path
 from typing import Any
 
@@ -14,7 +15,8 @@ from sandmould.runs.files import write_text
 
 END_CHECKPOINT = "end_checkpoint"
 """Folder of the state at the end of a fill, from which runs go on."""
-
+_FILLED = "fill_checkpoint"
+"""Folder of the same in a run that may begin again from there."""
 
 LAYOUT = 2
 """Of the files of checkpoints: raised when those of earlier versions cannot be read any more."""
@@ -57,6 +59,44 @@ def seal(folder: Path, mark: CheckpointMark) -> None:
     tree = {"mark": asdict(mark) | {"layout": LAYOUT}, "sha256": _digests(folder)}
     text = json.dumps(tree)
     write_text(folder / "mark.json", text)
+
+
+def lay(source: Path, target: Path, mark: CheckpointMark) -> None:
+    """Make a checkpoint of the files of another one, which comes as a whole."""
+    partial = empty(target.with_name(f"{target.name}_partial"))
+    for file in source.iterdir():
+        if file.name != "mark.json":
+            _link(file, partial / file.name)
+    seal(partial, mark)
+    shutil.rmtree(target, ignore_errors=True)
+    partial.rename(target)
+
+
+def _link(source: Path, target: Path) -> None:
+    """Give a file a second name; copy it where the file system has no such names."""
+    try:
+        os.link(source, target)
+    except OSError:
+        shutil.copyfile(source, target)
+
+
+def keep_filled(work: Path, newest: tuple[Path, CheckpointMark]) -> None:
+    """Keep the end of the fill, which is the newest checkpoint."""
+    lay(newest[0], work / _FILLED, newest[1])
+
+
+def begin_again(work: Path, bed_limit_s: float, cost: dict[str, Any]) -> None:
+    """Make the end of the fill the newest checkpoint, with another limit of the bed.
+
+    Raises
+    ------
+    ValueError
+        When it is missing or damaged.
+    """
+    mark = replace(read_mark(work / _FILLED), bed_limit_s=bed_limit_s, cost=cost)
+    for name in ("checkpoint_a", "checkpoint_b"):
+        shutil.rmtree(work / name, ignore_errors=True)
+    lay(work / _FILLED, work / "checkpoint_a", mark)
 
 
 def read_mark(folder: Path) -> CheckpointMark:

@@ -41,10 +41,13 @@ class Cost:
     """Of the first rank."""
     largest_overlap_fraction: float = 0.0
     bed_limit_s: float | None = None
-    """Exact critical step of the filled bed, where the run takes its step from it."""
+    """Exact critical step of the filled bed, where the run takes its step from it; of the shaken
+    bed where it has begun again."""
     least_limit_s: float | None = None
     """Least one of the shaken bed, over the moments at which it was found."""
     limit_moments: int = 0
+    begun_again: int = 0
+    """Times that it has begun again from its fill, with a shorter step."""
     fill: str = ""
     """Fill that it shares, whose own cost counts apart."""
 
@@ -56,7 +59,13 @@ class Cost:
         """Columns of the cost row in ``products.json`` and their values."""
         rate = self.grain_steps / self.engine_wall_s if self.engine_wall_s > 0 else 0.0
         columns = {**self.row(), "grain_steps_per_s": rate}
-        absent = {"bed_limit_s": None, "least_limit_s": None, "limit_moments": 0, "fill": ""}
+        absent = {
+            "bed_limit_s": None,
+            "least_limit_s": None,
+            "limit_moments": 0,
+            "begun_again": 0,
+            "fill": "",
+        }
         return {k: v for k, v in columns.items() if k not in absent or v != absent[k]}
 
 

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import os
 import shutil
 from collections.abc import Iterable
 from dataclasses import replace
@@ -74,18 +73,5 @@ def lay_checkpoint(
         largest_overlap_fraction=taken.largest_overlap_fraction,
         fill=fill,
     )
-    partial = checkpoints.empty(work / "checkpoint_of_fill")
-    for file in source.iterdir():
-        if file.name != "mark.json":
-            _link(file, partial / file.name)
     mark = replace(mark, scenario_hash=run_hash, cost=cost.row(), shared_stages=stages)
-    checkpoints.seal(partial, mark)
-    partial.rename(work / "checkpoint_a")
-
-
-def _link(source: Path, target: Path) -> None:
-    """Give a file a second name; copy it where the file system has no such names."""
-    try:
-        os.link(source, target)
-    except OSError:
-        shutil.copyfile(source, target)
+    checkpoints.lay(source, work / "checkpoint_a", mark)

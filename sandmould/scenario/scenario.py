@@ -9,7 +9,7 @@ from functools import cached_property
 from typing import Any, Literal, Self
 
 import numpy as np
-from pydantic import Field
+from pydantic import Field, model_validator
 
 from sandmould.geometry.geometry import Scene
 from sandmould.scenario.box import Box, Obstacle, Piston, Plate, build_scene, piston_wall
@@ -23,7 +23,7 @@ from sandmould.scenario.quantity import Section, quantity
 from sandmould.scenario.rest import Rest
 from sandmould.scenario.sand import ARGUED, Sand
 from sandmould.scenario.stages import StageKind, is_filling
-from sandmould.scenario.time_step import CriticalStep, TimeStep, critical_step
+from sandmould.scenario.time_step import BED_FRACTION, CriticalStep, TimeStep, critical_step
 from sandmould.scenario.unbalance import Unbalance
 from sandmould.scenario.vibration import BoxStage, VibrationStage
 
@@ -124,6 +124,20 @@ class Scenario(Section):
     guard: GuardLimits = Field(GuardLimits(), description="When a run is stopped.")
     seed: int = quantity(1, "Seed of all that is drawn.", source="user", ge=0, le=2**31 - 1)
 
+    @model_validator(mode="after")
+    def _step_of_bed_where_one_gives_it(self) -> Self:
+        """Set the share of the bed's limit where it counts, and nowhere else."""
+        taken = self.time_step.bed_fraction
+        if self.time_step.step_s is not None or self.pattern is not None:
+            taken = None
+        elif taken is None and self.vibrations:
+            taken = BED_FRACTION
+        if taken != self.time_step.bed_fraction:
+            # A section never changes once read; this is its reading.
+            changed = self.time_step.model_copy(update={"bed_fraction": taken})
+            object.__setattr__(self, "time_step", changed)
+        return self
+
     @cached_property
     def scene(self) -> Scene:
         """Geometry of the box, the obstacles and the cavities."""
@@ -217,9 +231,22 @@ class Scenario(Section):
 
     @property
     def step_s(self) -> float:
-        """The time step: the user's own, or the asked fraction of the critical one."""
+        """The time step: the user's own, that of the filled bed, or the planned one."""
         own = self.time_step.step_s
-        return self.planned_step_s if own is None else own
+        waits = self.takes_step_of_bed and not self.has_step_of_bed
+        return self.planned_step_s if own is None or waits else own
+
+    @property
+    def takes_step_of_bed(self) -> bool:
+        """Whether the filled bed gives the time step of what follows, or its limit."""
+        own = self.time_step.step_s
+        above = own is not None and own > self.critical_step.step_s
+        return above or bool(self.time_step.bed_fraction)
+
+    @property
+    def has_step_of_bed(self) -> bool:
+        """Whether the filled bed has done so."""
+        return bool(self.time_step.bed_fraction) and self.time_step.step_s is not None
 
     @property
     def planned_step_s(self) -> float:

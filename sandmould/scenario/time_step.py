@@ -15,7 +15,7 @@ class TimeStep(Section):
     """How the time step is chosen."""
 
     fraction: float = quantity(
-        0.5, "Time step over the critical one.", source=ARGUED, ge=1e-3, le=1
+        0.7, "Time step over the critical one.", source=ARGUED, first=0.5, ge=1e-3, le=1
     )
     rotational_inertia: Literal["physical", "scaled"] = quantity(
         "physical",
@@ -24,22 +24,28 @@ class TimeStep(Section):
         source=ARGUED,
     )
     step_s: float | None = quantity(
-        None, "A time step of the user's own, at most the critical one.", unit="s",
+        None, "A time step of the user's own. Above the critical one it is that of what follows "
+        "the fill, and at most the exact limit of the filled bed.", unit="s",
         source="user", ge=1e-12,
     )  # fmt: skip
     bed_fraction: float | None = quantity(
         None,
-        "Time step after the fill over the exact limit of the filled bed. The limit is found "
-        "once, when the fill is at rest; 0.7 leaves room for a bed that vibration packs. Unless "
-        "given, the planned step stays.",
-        source="user",
-        ge=1e-3,
+        "Time step after the fill over the exact limit of the filled bed, which is found when the "
+        "fill is at rest; 0.7 unless given. 0: the step of the fill stays, as it does without "
+        "vibration, with a pattern and with a step_s.",
+        source=ARGUED,
+        ge=0,
         le=1,
     )
 
 
-CONTACTS = {2: 6.0, 3: 12.0}
-"""That a grain can have, as the densest packings of equal grains have them."""
+BED_FRACTION = 0.7
+"""Unless given; it leaves room for a bed that vibration packs."""
+CONTACTS = 6.0
+"""Of a grain in the lattice whose limit is planned: that of hexagonal discs, and the least that
+holds spheres without friction. Beds, filled and filling, had the limit of 4.0 to 5.2 (discs) and
+3.6 to 5.6 contacts (spheres), fewer the wider their sizes are spread, and of 5.8 without
+friction."""
 LEAST_STEPS_A_PERIOD = 20
 """Time steps of a period of vibration."""
 
@@ -133,12 +139,11 @@ def critical_step(
     The paper's (51) is the case of one contact with a fixed body. The smallest class stands for
     all, since omega goes as 1/sqrt(m).
     """
-    contacts = CONTACTS[dimension]
     factor = inertia_factor(sand, contact, time_step, dimension)
     smallest = sand.classes(dimension)[0].diameter_m
     mass = sand.grain_mass_kg(smallest, dimension)
     corrected = contact.dashpot == "corrected"
-    grain_n, grain_r = _modes(contact.grain_grain, mass, contacts, factor, 2, corrected)
+    grain_n, grain_r = _modes(contact.grain_grain, mass, CONTACTS, factor, 2, corrected)
     # At most `dimension` walls meet in a corner.
     wall_n, wall_r = _modes(contact.grain_wall, mass, dimension, factor, 1, corrected)
     steps = {

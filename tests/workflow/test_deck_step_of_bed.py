@@ -141,7 +141,7 @@ def shaken_m(scene: Scenario, fill: Path, folder: Path, forgets: bool = False) -
 def test_contacts_remember_over_the_change_of_the_step(branched: Branched, tmp_path: Path) -> None:
     """A step as good as the old one moves the grains as if there had been no change."""
     scene, fill, _ = branched
-    plain = scene.model_copy(update={"time_step": TimeStep()})
+    plain = scene.model_copy(update={"time_step": TimeStep(bed_fraction=None)})
     close = with_bed_step(scene, scene.planned_step_s / 0.7 * 1.0005)
     assert close.step_s == pytest.approx(scene.planned_step_s, rel=1e-3)
     before = shaken_m(plain, fill, tmp_path / "before")

@@ -11,6 +11,7 @@ import pandas as pd
 import pytest
 import yaml
 
+from sandmould.engines.bed_step import MOST_AGAIN
 from sandmould.engines.driver import Driver
 from sandmould.engines.reference.session import ReferenceSession
 from sandmould.engines.session import Session
@@ -125,23 +126,66 @@ def test_a_killed_run_goes_on_with_the_same_step(
     assert cost_of(whole).time_step_s == cost_of(straight).time_step_s
 
 
-def test_a_step_above_the_limit_of_the_shaken_bed_is_told(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+@pytest.mark.parametrize("shared", [False, True])
+def test_a_run_whose_bed_becomes_too_stiff_begins_again_from_its_fill(
+    shared: bool, straight: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     found = ReferenceSession.exact_limit_s
 
     def shrinks(session: ReferenceSession) -> float:
-        return found(session) * (0.6 if session.stage.counts_as_vibration else 1.0)
+        stiff = session.step_s > 2.5e-5 and session.stage.counts_as_vibration
+        return found(session) * (0.6 if stiff else 1.0)
 
     monkeypatch.setattr(ReferenceSession, "exact_limit_s", shrinks)
+    if shared:
+        (folder, _), fill = pair(tube_scene(**OF_BED), tmp_path)
+        assert compute(fill) is Outcome.FINISHED
+    else:
+        folder = run_folder(tube_scene(**OF_BED), tmp_path)
+    assert compute(folder) is Outcome.FINISHED
+    detail, cost = RunOutcome.read(folder / "outcome.json").detail, cost_of(folder)
+    assert detail.startswith("the run began again from its fill once, since the exact limit of the")
+    assert cost.begun_again == 1
+    assert cost.least_limit_s > cost.time_step_s
+    assert 0.999 * 0.7 < cost.time_step_s / cost.bed_limit_s <= 0.7
+    assert cost.bed_limit_s < cost_of(straight).time_step_s
+    # as if that limit had been found at once
+    other = run_folder(tube_scene(**OF_BED), tmp_path / "other")
+    monkeypatch.setattr(ReferenceSession, "exact_limit_s", lambda *_: float(cost.bed_limit_s))
+    assert compute(other) is Outcome.FINISHED
+    assert_same(folder, other)
+
+
+def test_a_bed_that_is_too_stiff_again_and_again_is_told(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    def limit_s(session: ReferenceSession) -> float:
+        return 0.99 * session.step_s if session.stage.counts_as_vibration else 4e-5
+
+    monkeypatch.setattr(ReferenceSession, "exact_limit_s", limit_s)
     folder = run_folder(tube_scene(**OF_BED), tmp_path)
     assert compute(folder) is Outcome.FINISHED
-    detail = RunOutcome.read(folder / "outcome.json").detail
-    assert detail.startswith("the time step 3.058e-05 s was above the exact limit of the shaken")
-    assert cost_of(folder).least_limit_s < cost_of(folder).time_step_s
+    detail, cost = RunOutcome.read(folder / "outcome.json").detail, cost_of(folder)
+    assert cost.begun_again == MOST_AGAIN
+    assert cost.least_limit_s < cost.time_step_s
+    assert "; the time step 9.3" in detail
+    assert detail.endswith("take a smaller time_step.bed_fraction")
 
 
-def test_the_plan_counts_the_planned_step_and_says_so(
+def test_a_step_of_the_users_own_above_the_limit_ends_the_run_after_its_fill(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(ReferenceSession, "exact_limit_s", lambda *_: 3.9e-5)
+    own = {**OF_BED, "time_step": {"step_s": 4e-5}}
+    folder = run_folder(tube_scene(**own), tmp_path)
+    assert compute(folder) is Outcome.BAD_INPUT
+    assert RunOutcome.read(folder / "outcome.json").detail == (
+        "time_step.step_s = 4e-05 cannot be used: valid is at most the exact limit of the filled "
+        "bed, 3.9e-05 s"
+    )
+
+
+def test_the_plan_counts_a_guess_of_the_step_and_says_so(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.chdir(tmp_path)
@@ -151,10 +195,11 @@ def test_the_plan_counts_the_planned_step_and_says_so(
     plan = open_plan(Path("small.yaml"))
     assert len(plan.fills) == 1
     said = plan_table([*plan.fills, *plan.runs], Prices(), 1)
-    assert "  1.68e-05 s planned  " in said
-    assert "Note: The price counts the planned time step. After the fill the step is 0.7" in said
-    without = {**tree, "scenario": {**tree["scenario"], "time_step": {"fraction": 0.5}}}
+    assert "  2.35e-05 s, then about 2.8e-05 s  " in said
+    step_s, guess_s = plan.runs[0].scenario.step_s, 0.7 * 1.2 * 3.351e-5
+    without = {**tree, "scenario": {**tree["scenario"], "time_step": {"bed_fraction": 0.0}}}
     Path("plain.yaml").write_text(yaml.safe_dump(without))
     plain = open_plan(Path("plain.yaml"))
-    assert [own_work(run) for run in plain.runs] == [own_work(run) for run in plan.runs]
-    assert " s planned" not in plan_table([*plain.fills, *plain.runs], Prices(), 1)
+    work = [own_work(each.runs[0]) for each in (plan, plain)]
+    assert work[0] / work[1] == pytest.approx(step_s / guess_s, rel=1e-3)
+    assert ", then about" not in plan_table([*plain.fills, *plain.runs], Prices(), 1)

@@ -10,6 +10,7 @@ import numpy as np
 
 from sandmould.dem import source_files, source_hash
 from sandmould.digest import SHORT
+from sandmould.engines.bed_deck import step_meaning
 from sandmould.engines.capabilities import Capabilities, Ranks
 from sandmould.engines.deck import Deck, exact
 from sandmould.engines.deck_context import deck_context
@@ -85,6 +86,7 @@ def render_deck(program: Program, sources: Mapping[str, str], run: str, study: s
         "inertia_factor": inertia_factor(scenario.sand, scenario.laws, scenario.time_step, d),
         "surfaces": surfaces_of(scenario).names,
         "planned_step_s": scenario.planned_step_s,
+        "step_meaning": step_meaning(scenario),
     }
     return Deck.render("reference", context)
 

@@ -267,7 +267,8 @@ class ReferenceSession(StagedSession):
         """Limit of all contacts; sparse matrices are loaded for runs that ask for it alone."""
         from sandmould.dem.critical_step import active_contacts, whole_step
 
-        return whole_step(active_contacts(self.solver)).damped_s
+        of_step_s = self.step_s if self._scenario.has_step_of_bed else None
+        return whole_step(active_contacts(self.solver), of_step_s).damped_s
 
     def _save(self, folder: Path) -> None:
         """Write the solver's state, of which nothing is lost."""

@@ -92,7 +92,7 @@ class SandExecution(Execution[Scenario]):
     def load_computing(self, scenario: Scenario) -> None:
         """Import the engine's side of the house, and the pattern's where there is one."""
         registry.engine_of(scenario).load_session(scenario)
-        if scenario.time_step.bed_fraction is not None:
+        if scenario.takes_step_of_bed:
             importlib.import_module("sandmould.engines.bed_limit")
         if scenario.pattern is not None:
             importlib.import_module("sandmould.pattern_fe.coupling.opening")

@@ -36,13 +36,6 @@ def notes(scenario: Scenario) -> list[Note]:
         )
         told.append(Note("compiling", text))
     told += _drive_notes(scenario)
-    if scenario.time_step.bed_fraction is not None:
-        text = (
-            "The price counts the planned time step. After the fill the step is "
-            f"{scenario.time_step.bed_fraction:g} of the exact limit of the filled bed. Nobody "
-            "knows that limit before; mostly it allows a longer step."
-        )
-        told.append(Note("time step of the bed", text))
     solids: list[Outline | TriangleMesh] = [*scenario.scene.outlines, *scenario.scene.meshes]
     for solid in solids:
         wall = thinnest_wall([solid], smallest_m)

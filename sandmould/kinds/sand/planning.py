@@ -10,7 +10,7 @@ from sandmould import pattern_fe
 from sandmould.bad_input import Problem
 from sandmould.digest import digest
 from sandmould.engines import registry
-from sandmould.engines.durations import grain_steps, run_s, stage_s
+from sandmould.engines.durations import grain_steps, run_s, shaken_step_s, stage_steps
 from sandmould.engines.program import build_program
 from sandmould.kinds.kind import BASE_MEMORY_MB, Note, Planning, SpeedClass
 from sandmould.kinds.sand.measures import MEASURES
@@ -188,8 +188,7 @@ class SandPlanning(Planning[Scenario]):
 
     def planned_steps(self, scenario: Scenario) -> int:
         """Time steps of a run: its fill and its rests, estimated, and its vibration."""
-        program = build_program(scenario)
-        return sum(math.ceil(stage_s(program, each) / scenario.step_s) for each in program.stages)
+        return sum(map(math.ceil, stage_steps(build_program(scenario))))
 
     def speed_class(self, scenario: Scenario) -> SpeedClass:
         """Engine and dimension."""
@@ -197,10 +196,12 @@ class SandPlanning(Planning[Scenario]):
 
     def plan_cells(self, scenario: Scenario) -> Mapping[str, str]:
         """Grains, time step and steps."""
-        takes_step_of_bed = scenario.time_step.bed_fraction is not None
+        step_s, shaken_s = scenario.step_s, shaken_step_s(scenario)
+        changes = bool(scenario.vibrations) and shaken_s != step_s
+        then = f", then about {shaken_s:.2g} s" if changes else ""
         return {
             "grains": f"{sum(plan_counts(scenario)):,}",
-            "time step": f"{scenario.step_s:.3g} s" + (" planned" if takes_step_of_bed else ""),
+            "time step": f"{step_s:.3g} s{then}",
             "steps": f"{self.planned_steps(scenario):,}",
         }
 

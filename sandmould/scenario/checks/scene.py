@@ -29,6 +29,8 @@ from sandmould.scenario.solids import (
 from sandmould.scenario.time_step import LEAST_STEPS_A_PERIOD
 from sandmould.scenario.vibration import Shaking, VibrationStage
 
+MOST_OF_BED = 2
+"""Of the planned critical step: the limits of beds were at most 1.7 of it."""
 SHORTEST_STEP_S = 1e-9
 """A second of shorter steps takes more than ten hours for a thousand grains."""
 KINDS = {2: ("plate", "tube", "polygon"), 3: ("plate", "tube", "cylinder", "mesh", "triangles")}
@@ -250,17 +252,17 @@ def _springs(s: Scenario) -> Iterator[Problem]:
 def _time(s: Scenario) -> Iterator[Problem]:
     critical = s.critical_step
     own = s.time_step.step_s
-    if s.time_step.bed_fraction is not None:
-        yield from _bed_step(s, s.time_step.bed_fraction)
-    if own is not None and own > critical.step_s:
+    step_s = own or s.step_s
+    of_bed = s.pattern is None and bool(s.vibrations)
+    most_s = critical.step_s * (MOST_OF_BED if of_bed else 1)
+    if step_s > most_s:
+        valid = f"at most the critical step {most_s:.4g} s"
+        if of_bed:
+            valid = f"at most {most_s:.4g} s, {MOST_OF_BED} times the critical step"
+        yield Problem("time_step.step_s", own, f"{valid}, set by {critical.cause}")
+    elif s.rest.check_every_s < step_s:
         yield Problem(
-            "time_step.step_s",
-            own,
-            f"at most the critical step {critical.step_s:.4g} s, set by {critical.cause}",
-        )
-    elif s.rest.check_every_s < s.step_s:
-        yield Problem(
-            "rest.check_every_s", s.rest.check_every_s, f"at least the time step {s.step_s:.4g} s"
+            "rest.check_every_s", s.rest.check_every_s, f"at least the time step {step_s:.4g} s"
         )
     shaken_s = s.rest.shaken_check_every_s
     key, least_s = "rest.check_every_s", s.rest.check_every_s
@@ -288,19 +290,6 @@ def _time(s: Scenario) -> Iterator[Problem]:
         )
 
 
-def _bed_step(s: Scenario, fraction: float) -> Iterator[Problem]:
-    """What keeps a step from being taken from the filled bed."""
-    reasons = {
-        "absent where time_step.step_s gives the step of the whole run": s.time_step.step_s,
-        "absent with a pattern, whose own limit is that of the planned step": s.pattern,
-        "absent without vibration, for the step serves what follows the fill": not s.vibrations,
-    }
-    for valid, reason in reasons.items():
-        if reason:
-            yield Problem("time_step.bed_fraction", fraction, valid)
-            return
-
-
 def _vibration(s: Scenario) -> Iterator[Problem]:
     stages: list[tuple[str, Shaking]] = []
     for i, stage in enumerate(s.vibration):
@@ -325,12 +314,13 @@ def _vibration(s: Scenario) -> Iterator[Problem]:
                 list(shaking.direction),
                 f"vertical, horizontal or {s.dimension} numbers",
             )
-        steps = 1 / (shaking.frequency_hz * s.step_s)
+        step_s = s.time_step.step_s or s.step_s
+        steps = 1 / (shaking.frequency_hz * step_s)
         if steps < LEAST_STEPS_A_PERIOD:
             yield Problem(
                 f"{key}.frequency_hz",
                 shaking.frequency_hz,
-                f"at most {1 / (LEAST_STEPS_A_PERIOD * s.step_s):.4g} Hz, "
+                f"at most {1 / (LEAST_STEPS_A_PERIOD * step_s):.4g} Hz, "
                 f"{LEAST_STEPS_A_PERIOD} time steps a period",
             )
 

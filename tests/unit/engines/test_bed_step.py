@@ -3,17 +3,21 @@
 from __future__ import annotations
 
 import math
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
 import pytest
 
-from sandmould.engines.bed_step import MOMENTS, limit_moments, limit_warning, with_bed_step
-from sandmould.engines.durations import stage_s
+from sandmould.engines.bed_step import MOMENTS, limit_moments, limit_notes, with_bed_step
+from sandmould.engines.durations import cost_before, stage_s
 from sandmould.engines.program import build_program
 from sandmould.engines.reference.session import ReferenceSession
+from sandmould.engines.session import EngineStop
+from sandmould.scenario.reading import Origin, merge
+from sandmould.scenario.scenario import Scenario
 from sandmould.scenario.time_step import damped_step
-from tests.scenes import tube_scene
+from tests.scenes import TUBE_SCENE, tube_scene
 
 OF_BED: dict[str, Any] = {"engine": {"name": "reference"}, "time_step": {"bed_fraction": 0.7}}
 SMOOTH = {"normal_stiffness_n_m": 7e4, "tangential_stiffness_n_m": 7e4, "friction": 0.0,
@@ -91,6 +95,33 @@ def test_moments_see_all_phases_of_the_box() -> None:
     assert gaps.max() < 0.2
 
 
+def test_a_step_of_the_users_own_waits_for_the_bed_and_keeps_below_its_limit() -> None:
+    scene = tube_scene(time_step={"step_s": 4e-5})
+    assert scene.step_s == scene.planned_step_s < scene.critical_step.step_s < 4e-5
+    given = with_bed_step(scene, 5e-5)
+    assert (given.step_s, given.time_step.bed_fraction) == (4e-5, pytest.approx(0.8))
+    with pytest.raises(EngineStop, match=r"time_step.step_s = 4e-05 cannot be used: valid is at m"):
+        with_bed_step(scene, 3.9e-5)
+    # one that the plan allows is that of the whole run
+    whole = tube_scene(time_step={"step_s": 3e-5})
+    assert (whole.step_s, whole.takes_step_of_bed) == (3e-5, False)
+
+
+@pytest.mark.parametrize("change", [{"vibration": []}, {"time_step": {"step_s": 1e-5}}])
+def test_the_step_of_the_bed_is_taken_where_there_is_one(change: dict[str, Any]) -> None:
+    tree = {key: value for key, value in TUBE_SCENE.items() if key != "time_step"}
+    scene = Scenario.model_validate(tree)
+    assert scene.time_step.bed_fraction == 0.7
+    changed = Scenario.model_validate(merge(tree, change, Origin(), "test"))
+    assert not changed.takes_step_of_bed
+    # the fill of a scene that is shaken is one of its own
+    assert Scenario.model_validate(scene.before_vibration.model_dump()).takes_step_of_bed
+
+
 def test_a_limit_below_the_step_is_told() -> None:
-    assert limit_warning(3e-5, None) == limit_warning(3e-5, 3e-5) == ""
-    assert "the time step 3e-05 s was above the exact limit" in limit_warning(3e-5, 2.9e-5)
+    cost = replace(cost_before(tube_scene()), time_step_s=3e-5)
+    assert limit_notes(cost) == limit_notes(replace(cost, least_limit_s=3e-5)) == []
+    (note,) = limit_notes(replace(cost, least_limit_s=2.9e-5))
+    assert note.startswith("the time step 3e-05 s was above the exact limit of the shaken bed")
+    (note,) = limit_notes(replace(cost, begun_again=2, bed_limit_s=4e-5, least_limit_s=4e-5))
+    assert note.startswith("the run began again from its fill 2 times, since the exact limit of")

@@ -31,7 +31,6 @@ MUTATIONS: list[tuple[str, str, str]] = [
         "fill.vibration",
     ),
     ("tube_certified", "vibration: []", "vibration"),
-    ("tube_step_of_bed", "time_step: {step_s: 1e-6}", "time_step.step_s"),
     # engine
     ("pressed_bed", "engine: {name: lammps}", "engine.name"),
     ("gate_time", "engine: {name: liggghts}", "engine.name"),
