@@ -293,9 +293,12 @@ def _gathered(builder: Any, start: Any, at: Any, columns: int) -> list[Any]:
         declared = ir.FunctionType(vector, [pointers, _WORD, mask, vector])
         gather = cgutils.get_or_insert_function(builder.module, declared, name)
         every = ir.Constant(mask, [1] * width)
+        address = builder.mul(at, _every(builder, _LONG(8), at.type))
+        address = builder.add(address, _every(builder, builder.ptrtoint(start, _LONG), at.type))
         for column in range(columns):
-            pointer = builder.gep(builder.gep(start, [_LONG(column)]), [at])
-            found.append(builder.call(gather, [pointer, _WORD(8), every, ir.Constant(vector, None)]))
+            here = builder.add(address, _every(builder, _LONG(8 * column), at.type))
+            nothing, pointer = ir.Constant(vector, None), builder.inttoptr(here, pointers)
+            found.append(builder.call(gather, [pointer, _WORD(8), every, nothing]))
         return found
     items = [builder.gep(start, [builder.extract_element(at, _WORD(k))]) for k in range(width)]
     for column in range(columns):

@@ -55,7 +55,9 @@ def from_arrays(
     grains, pairs = part(Grains, "grains"), part(Pairs, "pairs")
     bound = chunk_bounds(len(grains.id))
     dim = dim_of(grains.position.shape[1])
-    near = new_near_pairs(dim, lanes, bound, grains, pairs, part(Contacts, "contacts"), 0.0)
+    near = new_near_pairs(
+        dim, len(lanes), bound, grains, pairs, part(Contacts, "contacts"), 0.0
+    )
     walls = new_walls(
         part(SurfaceArrays, "surfaces"),
         bound,
@@ -68,6 +70,7 @@ def from_arrays(
         pair_up(grains, grain_law),
         pairs,
         near,
+        lanes,
         bound,
         walls._replace(listed=arrays["listed_vertices"]),
         arrays["orientation"],

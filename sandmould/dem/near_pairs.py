@@ -67,8 +67,6 @@ class Contacts(NamedTuple):
 class NearPairs(NamedTuple):
     """Near pairs of both grains; the rows of a chunk fill the front of the room that it has."""
 
-    lanes: tuple[float, ...]
-    """W zeros: their number tells compiled code how many lanes there are."""
     first_slice: Ints
     """(c + 1,) int64: first slice of each chunk."""
     grain: Places
@@ -332,7 +330,7 @@ def look(
 
 def new_near_pairs(
     dim: Any,
-    lanes: tuple[float, ...],
+    width: int,
     bound: Ints,
     grains: Grains,
     pairs: Pairs,
@@ -344,7 +342,8 @@ def new_near_pairs(
     Parameters
     ----------
     dim : tuple of d floats
-    lanes : tuple of W floats
+    width : int
+        How many lanes there are.
     bound : (c + 1,) int64
         First grains of the chunks.
     grains : Grains
@@ -355,7 +354,7 @@ def new_near_pairs(
     gap_m : float
         Not negative.
     """
-    width, counts = len(lanes), np.diff(bound)
+    counts = np.diff(bound)
     first_slice = np.concatenate([[0], (-(-counts // width)).cumsum()])
     grain = np.concatenate(
         [
@@ -364,7 +363,6 @@ def new_near_pairs(
         ]
     ).reshape(-1, width)
     near = NearPairs(
-        lanes,
         first_slice,
         grain.astype(np.uint32),
         np.zeros(len(grain), dtype=np.int64),

@@ -33,6 +33,7 @@ _NUMBER, _SIZES = (0.0,), (0.0, 0.0, 0.0)
 @njit(**OPTIONS)
 def pass_pairs(
     dim: Any,
+    lanes: Any,
     c: int,
     grains: Grains,
     ahead: Floats,
@@ -52,6 +53,8 @@ def pass_pairs(
     ----------
     dim : tuple
         ``PLANE`` or ``SPACE``.
+    lanes : tuple
+        As long as the slices are wide.
     c : int
         The chunk.
     grains : Grains
@@ -79,7 +82,7 @@ def pass_pairs(
     position, velocity, spin = grains.position, grains.velocity, grains.spin
     kind, radius, force, moment = grains.kind, grains.radius_of, grains.force, grains.moment
     mass, inertia = grains.mass_of, grains.inertia_of
-    lanes, grain, other, held, history = near.lanes, near.grain, near.other, near.held, near.history
+    grain, other, held, history = near.grain, near.other, near.held, near.history
     first_row, last_row, kinds = near.first_row, near.last_row, len(radius)
     width, like_spin = len(lanes), no_spin(dim)
     part = len(like_spin) * width

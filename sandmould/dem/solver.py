@@ -106,13 +106,13 @@ class Solver:
         candidates = Candidates(none, np.zeros(1, dtype=np.uint32), none.copy())
         bound = chunk_bounds(0)
         history = new_history(self._dim, 0)
-        near = new_near_pairs(self._dim, self._lanes, bound, grains, pairs, Contacts.none(d), 0.0)
+        near = new_near_pairs(self._dim, len(self._lanes), bound, grains, pairs, Contacts.none(d), 0.0)
         walls = new_walls(self.surfaces.arrays, bound, candidates, history)
         coefficients = pair_up(grains, self.scene.grain_law)
         upright, listed = self._upright(0), np.zeros((0, d))
         return Moving(
-            grains, listed.copy(), coefficients, pairs, near, bound, walls, upright, listed,
-            np.zeros(1),
+            grains, listed.copy(), coefficients, pairs, near, self._lanes, bound, walls, upright,
+            listed, np.zeros(1),
         )  # fmt: skip
 
     def _upright(self, n: int) -> Floats:
@@ -228,7 +228,7 @@ class Solver:
         bound = chunk_bounds(n)
         speed2 = float(np.einsum("ij,ij->i", grains.velocity, grains.velocity).max())
         gap_m = near_gap(self._skin, self.scene.dt * math.sqrt(speed2))
-        near = new_near_pairs(self._dim, self._lanes, bound, grains, pairs, contacts, gap_m)
+        near = new_near_pairs(self._dim, len(self._lanes), bound, grains, pairs, contacts, gap_m)
         arrays = self.surfaces.arrays
         reach_m = self._skin + float(grains.radius_of.max())
         candidates = candidates_in(
@@ -255,6 +255,7 @@ class Solver:
             pair_up(grains, self.scene.grain_law),
             pairs,
             near,
+            self._lanes,
             bound,
             walls,
             orientation,
@@ -267,7 +268,7 @@ class Solver:
         """Choose the near pairs anew, with room for all of them."""
         moving, gap_m = self.moving, float(self.moving.near.gap[0])
         near = new_near_pairs(
-            self._dim, self._lanes, moving.bound, moving.grains, moving.pairs, self.contacts, gap_m
+            self._dim, len(self._lanes), moving.bound, moving.grains, moving.pairs, self.contacts, gap_m
         )
         self.moving = moving._replace(near=near)
 

@@ -82,6 +82,8 @@ class Moving(NamedTuple):
     """See ``pair_up``."""
     pairs: Pairs
     near: NearPairs
+    lanes: tuple[float, ...]
+    """As many zeros as a slice of near pairs has lanes, which compiled code tells from them."""
     bound: Ints
     """(c + 1,) int64: first grains of the chunks."""
     walls: Walls
@@ -116,7 +118,7 @@ def shares(bound: Ints, near: NearPairs, threads: int) -> Ints:
         return np.array([0, chunks])
     # A near pair costs about as much as a grain beside its pairs.
     rows = np.concatenate([[0], (near.last_row - near.first_row).cumsum()])[near.first_slice]
-    work = np.diff(rows) * len(near.lanes) + np.diff(bound)
+    work = np.diff(rows) * near.grain.shape[1] + np.diff(bound)
     ends = np.concatenate([[0], work.cumsum()])
     equal = ends[-1] * np.arange(1, threads) / threads
     nearest = np.abs(ends[:, None] - equal).argmin(axis=0)
@@ -186,8 +188,8 @@ def _find_forces(
         walls.due,
     )
     fastest2 = pass_pairs(
-        dim, c, grains, ahead, moving.coefficients, moving.near, scene.grain_law, scene.damping,
-        body, dt, moves,
+        dim, moving.lanes, c, grains, ahead, moving.coefficients, moving.near, scene.grain_law,
+        scene.damping, body, dt, moves,
     )  # fmt: skip
     if moves and len(moving.orientation):
         turn(dim, first, last, grains.moment, moving.orientation, dt)

@@ -177,7 +177,7 @@ def test_looks_for_near_pairs_change_no_bit(
         always.moving.near.left[:] = -1.0
         moving = never.moving
         whole = new_near_pairs(
-            never._dim, never._lanes, moving.bound, moving.grains, moving.pairs, never.contacts, 1.0
+            never._dim, len(never._lanes), moving.bound, moving.grains, moving.pairs, never.contacts, 1.0
         )
         whole.left[:] = np.inf
         never.moving = moving._replace(near=whole)
