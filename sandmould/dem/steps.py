@@ -152,7 +152,7 @@ def exchanged(grains: Grains, ahead: Floats) -> tuple[Grains, Floats]:
 
 
 @njit(**OPTIONS)
-def _find_forces(
+def step_chunk(
     dim: Any, c: int, scene: DemScene, moving: Moving, grains: Grains, ahead: Floats,
     shift: Any, speed: Any, body: Any, dt: float, moves: bool,
 ) -> float:
@@ -208,9 +208,7 @@ def find_forces(dim: Any, scene: DemScene, moving: Moving) -> None:
     """
     none = no_vector(dim)
     for c in range(len(moving.bound) - 1):
-        _find_forces(
-            dim, c, scene, moving, moving.grains, moving.ahead, none, none, none, 0.0, False
-        )
+        step_chunk(dim, c, scene, moving, moving.grains, moving.ahead, none, none, none, 0.0, False)
 
 
 @njit(**INLINED)
@@ -334,7 +332,7 @@ def advance(
             moves = k < steps
             body = _body(dim, scene, displacement, k) if moves else scene.gravity
             for c in mine:
-                speeds2[c] = _find_forces(
+                speeds2[c] = step_chunk(
                     dim, c, scene, moving, grains, ahead, shift, speed, body, scene.dt, moves
                 )
             if not moves:
