@@ -296,7 +296,9 @@ def look(
     histories = np.empty((rows_kept, parts, width))
     for row in range(len(kept)):
         if kept[row] >= 0:
-            histories[kept[row]] = history[first + row]
+            for part in range(parts):
+                for lane in range(width):
+                    histories[kept[row], part, lane] = history[first + row, part, lane]
     place = np.empty(bound[c + 1] - begin, dtype=np.int64)
     for k in range(len(place)):
         slot = first_slice * width + k
@@ -310,8 +312,11 @@ def look(
     for s in range(len(rows)):
         end = row + rows[s]
         first_row[first_slice + s], last_row[first_slice + s] = row, end
-        held[row:end] = 0
-        history[row:end] = 0.0
+        for q in range(row, end):
+            held[q] = 0
+            for part in range(parts):
+                for lane in range(width):
+                    history[q, part, lane] = 0.0
         for lane in range(width):
             k = order[s * width + lane]
             grain[first_slice + s, lane] = begin + k

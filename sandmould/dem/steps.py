@@ -18,7 +18,17 @@ from sandmould.dem.neighbours import Pairs
 from sandmould.dem.pairs import pass_pairs
 from sandmould.dem.surface_contacts import surface_forces
 from sandmould.dem.surfaces import SurfaceArrays, farthest_moved, move_vertices
-from sandmould.dem.vectors import INLINED, OPTIONS, dot, load, no_vector, plus, times
+from sandmould.dem.vectors import (
+    INLINED,
+    OPTIONS,
+    dot,
+    load,
+    no_spin,
+    no_vector,
+    plus,
+    store,
+    times,
+)
 from sandmould.dem.wall_history import WallHistory
 
 DONE, LIST_IS_OLD, NOT_A_NUMBER, NO_ROOM = 0, 1, 2, 3
@@ -161,8 +171,10 @@ def step_chunk(
     Gives their largest squared speed, m2/s2.
     """
     walls, first, last = moving.walls, moving.bound[c], moving.bound[c + 1]
-    grains.force[first:last] = 0.0
-    grains.moment[first:last] = 0.0
+    force, moment = grains.force, grains.moment
+    for i in range(first, last):
+        store(no_vector(dim), force, i)
+        store(no_spin(dim), moment, i)
     surface_forces(
         dim,
         walls.first_row[c],
