@@ -189,58 +189,64 @@ def _choose(
     near: NearPairs,
     place: Ints,
     kept: Ints,
-) -> tuple[Ints, Places, Ints]:
+) -> tuple[Ints, Ints, Places, Ints]:
     """Near pairs of a chunk among the listed ones.
 
-    Given are where those of each grain end, (n,) int64, and of each the other grain, and where the
-    history of its row was kept, or -1.
+    Given are where those of each grain end and how many of them touch, (n,) int64; and of each the
+    other grain, and where the history of its row was kept, or -1.
     """
     # Names of their own: taking an array out of a tuple inside the loop counts references.
     start, listed, old_other, width = pairs.start, pairs.other, near.other, near.grain.shape[1]
     position, kind, radius, gap = grains.position, grains.kind, grains.radius_of, near.gap[0]
     begin, end, first = bound[c], bound[c + 1], index(near.first[c])
-    stop = np.empty(end - begin, dtype=np.int64)
+    stop, touching = np.empty(end - begin, dtype=np.int64), np.zeros(end - begin, dtype=np.int64)
     other = np.empty(start[end] - start[begin] + 1, dtype=np.uint32)
     source = np.empty(len(other), dtype=np.int64)
     k = 0
     for i in range(begin, end):
-        x, reach = load(dim, position, i), radius[kind[i]] + gap
+        x, r, touched = load(dim, position, i), radius[kind[i]], 0
         s, lane = place[i - begin] // width, index(place[i - begin] % width)
         row, last = index(near.first_row[s]), index(near.last_row[s])
         for p in range(index(start[i]), index(start[i + 1])):
             j = listed[p]
             apart = plus(load(dim, position, j), -1.0, x)
-            far = reach + radius[kind[j]]
+            distance2, reach = dot(apart, apart), r + radius[kind[j]]
             # Written at all events: a branch here is guessed wrong too often.
             other[index(k)], source[index(k)] = j, -1
             # Rows and listed pairs are in the same order.
             if row < last and old_other[row, lane] == j:
                 source[index(k)] = kept[row - first]
                 row += index(1)
-            k += dot(apart, apart) < far * far
-        stop[i - begin] = k
-    return stop, other, source
+            touched += distance2 < reach * reach
+            k += distance2 < (reach + gap) * (reach + gap)
+        stop[i - begin], touching[i - begin] = k, touched
+    return stop, touching, other, source
 
 
 @njit(**OPTIONS)
-def _arrange(stop: Ints, width: int) -> tuple[Ints, Ints]:
-    """Grains of a chunk, counted from its first, in the order of lanes; and rows of each slice."""
+def _arrange(stop: Ints, touching: Ints, width: int) -> tuple[Ints, Ints]:
+    """Grains of a chunk, counted from its first, in the order of lanes; and rows of each slice.
+
+    Those that touch others come first: no slice without a contact finds any force.
+    """
     n = len(stop)
     order, rows = np.empty(-(-n // width) * width, dtype=np.int64), np.zeros(-(-n // width), np.int64)
-    ahead = np.empty(_MOST + 2, dtype=np.int64)
+    ahead = np.empty(2 * _MOST + 3, dtype=np.int64)
+    bucket = np.empty(n, dtype=np.int64)
     for first in range(0, n, WINDOW):
         last = min(first + WINDOW, n)
         ahead[:] = 0
         for k in range(first, last):
-            count = stop[k] - (stop[k - 1] if k else 0)
-            ahead[_MOST - min(count, _MOST) + 1] += 1
+            bucket[k] = _MOST - min(stop[k] - (stop[k - 1] if k else 0), _MOST)
+            bucket[k] += 0 if touching[k] else _MOST + 1
+            ahead[bucket[k] + 1] += 1
         ahead[0] = first
-        for k in range(_MOST + 1):
+        for k in range(2 * _MOST + 2):
             ahead[k + 1] += ahead[k]
         for k in range(first, last):
             count = stop[k] - (stop[k - 1] if k else 0)
-            slot = ahead[_MOST - min(count, _MOST)]
-            ahead[_MOST - min(count, _MOST)] += 1
+            slot = ahead[bucket[k]]
+            ahead[bucket[k]] += 1
             order[slot] = k
             rows[slot // width] = max(rows[slot // width], count)
     for slot in range(n, len(order)):
@@ -256,8 +262,8 @@ def _rows_needed(
     needed, none = np.zeros(len(bound) - 1, dtype=np.int64), np.zeros(0, dtype=np.int64)
     for c in range(len(needed)):
         place = np.zeros(bound[c + 1] - bound[c], dtype=np.int64)
-        stop, _, _ = _choose(dim, c, bound, grains, pairs, near, place, none)
-        needed[c] = _arrange(stop, near.grain.shape[1])[1].sum()
+        stop, touching, _, _ = _choose(dim, c, bound, grains, pairs, near, place, none)
+        needed[c] = _arrange(stop, touching, near.grain.shape[1])[1].sum()
     return needed
 
 
@@ -303,8 +309,8 @@ def look(
     for k in range(len(place)):
         slot = first_slice * width + k
         place[grain[slot // width, slot % width] - begin] = slot
-    stop, chosen, source = _choose(dim, c, bound, grains, pairs, near, place, kept)
-    order, rows = _arrange(stop, width)
+    stop, touching, chosen, source = _choose(dim, c, bound, grains, pairs, near, place, kept)
+    order, rows = _arrange(stop, touching, width)
     if rows.sum() > near.first[c + 1] - first:
         near.full[0] = 1
         return
