@@ -23,7 +23,11 @@ from numba.extending import intrinsic, models, overload, register_model
 _BIT, _BYTE, _WORD, _LONG, _DOUBLE = *map(ir.IntType, (1, 8, 32, 64)), ir.DoubleType()
 
 
-class Lanes(types.Type):  # type: ignore[misc]
+_compiled: Any = intrinsic
+"""Of any number of arguments, which its own type does not tell."""
+
+
+class Lanes(types.Type):
     """W floats of 64 bits."""
 
     def __init__(self, width: int) -> None:
@@ -32,7 +36,7 @@ class Lanes(types.Type):  # type: ignore[misc]
         super().__init__(f"Lanes({width})")
 
 
-class Mask(types.Type):  # type: ignore[misc]
+class Mask(types.Type):
     """W truth values."""
 
     def __init__(self, width: int) -> None:
@@ -41,7 +45,7 @@ class Mask(types.Type):  # type: ignore[misc]
         super().__init__(f"Mask({width})")
 
 
-class Places(types.Type):  # type: ignore[misc]
+class Places(types.Type):
     """W row numbers."""
 
     def __init__(self, width: int) -> None:
@@ -53,7 +57,7 @@ class Places(types.Type):  # type: ignore[misc]
 @register_model(Lanes)
 @register_model(Mask)
 @register_model(Places)
-class _VectorModel(models.PrimitiveModel):  # type: ignore[misc]
+class _VectorModel(models.PrimitiveModel):
     def __init__(self, manager: Any, kind: Any) -> None:
         super().__init__(manager, kind, kind.vector)
 
@@ -70,7 +74,9 @@ def _every(builder: Any, number: Any, vector: Any) -> Any:
     """A number in every lane."""
     undefined = ir.Constant(vector, ir.Undefined)
     one = builder.insert_element(undefined, number, ir.Constant(_WORD, 0))
-    return builder.shuffle_vector(one, undefined, ir.Constant(ir.VectorType(_WORD, vector.count), None))
+    return builder.shuffle_vector(
+        one, undefined, ir.Constant(ir.VectorType(_WORD, vector.count), None)
+    )
 
 
 def _like(context: Any, builder: Any, signature: Any, args: Any, wanted: Any) -> list[Any]:
@@ -174,7 +180,7 @@ for _function, _on_lanes in _ONE.items():
     _register_one(_function, _on_lanes)
 
 
-@intrinsic  # type: ignore[untyped-decorator]
+@_compiled
 def every(typing_context: Any, lanes: Any, number: Any) -> Any:
     """A plain number in all of W lanes: every(lanes, number)."""
     wanted = Lanes(lanes.count)
@@ -185,7 +191,7 @@ def every(typing_context: Any, lanes: Any, number: Any) -> Any:
     return wanted(lanes, types.float64), code
 
 
-@intrinsic  # type: ignore[untyped-decorator]
+@_compiled
 def where(typing_context: Any, condition: Any, a: Any, b: Any) -> Any:
     """One number where a condition holds, another where it does not: where(condition, a, b)."""
     wanted = Lanes(condition.vector.count) if isinstance(condition, Mask) else _widest(a, b)
@@ -197,7 +203,7 @@ def where(typing_context: Any, condition: Any, a: Any, b: Any) -> Any:
     return wanted(condition, a, b), code
 
 
-@intrinsic  # type: ignore[untyped-decorator]
+@_compiled
 def any_of(typing_context: Any, mask: Any) -> Any:
     """Whether a condition holds in any lane."""
 
@@ -208,7 +214,7 @@ def any_of(typing_context: Any, mask: Any) -> Any:
     return types.boolean(mask), code
 
 
-@intrinsic  # type: ignore[untyped-decorator]
+@_compiled
 def but(typing_context: Any, mask: Any, places: Any, others: Any) -> Any:
     """A condition where two places differ, false where they are the same."""
 
@@ -218,7 +224,7 @@ def but(typing_context: Any, mask: Any, places: Any, others: Any) -> Any:
     return mask(mask, places, others), code
 
 
-@intrinsic  # type: ignore[untyped-decorator]
+@_compiled
 def beside(typing_context: Any, places: Any, columns: Any, others: Any) -> Any:
     """Places in a table of rows and columns that lies row by row: beside(row, columns, column)."""
 
@@ -229,7 +235,7 @@ def beside(typing_context: Any, places: Any, columns: Any, others: Any) -> Any:
     return places(places, columns, others), code
 
 
-@intrinsic  # type: ignore[untyped-decorator]
+@_compiled
 def largest_of(typing_context: Any, lanes: Any) -> Any:
     """Largest of all lanes, or not a number where one is none."""
 
@@ -253,7 +259,7 @@ def _address(builder: Any, start: Any, at: Any, vector: Any) -> Any:
     return builder.bitcast(builder.gep(start, [at]), vector.as_pointer())
 
 
-@intrinsic  # type: ignore[untyped-decorator]
+@_compiled
 def places_at(typing_context: Any, lanes: Any, array: Any, i: Any) -> Any:
     """W row numbers of a line of uint32 from item i on: places_at(lanes, array, i)."""
     places = Places(lanes.count)
@@ -267,7 +273,7 @@ def places_at(typing_context: Any, lanes: Any, array: Any, i: Any) -> Any:
     return places(lanes, array, i), code
 
 
-@intrinsic  # type: ignore[untyped-decorator]
+@_compiled
 def kinds_at(typing_context: Any, array: Any, places: Any) -> Any:
     """Bytes of a line at W places, as places."""
 
@@ -310,7 +316,7 @@ def _gathered(builder: Any, start: Any, at: Any, columns: int) -> list[Any]:
     return found
 
 
-@intrinsic  # type: ignore[untyped-decorator]
+@_compiled
 def rows_at(typing_context: Any, like: Any, array: Any, places: Any) -> Any:
     """Rows of an array at W places, as a tuple of lanes as long as a tuple: rows_at(like, a, p).
 
@@ -326,7 +332,7 @@ def rows_at(typing_context: Any, like: Any, array: Any, places: Any) -> Any:
     return rows(like, array, places), code
 
 
-@intrinsic  # type: ignore[untyped-decorator]
+@_compiled
 def put_rows(typing_context: Any, rows: Any, array: Any, places: Any) -> Any:
     """Write a tuple of lanes to the rows of an array at W places."""
 
@@ -343,7 +349,7 @@ def put_rows(typing_context: Any, rows: Any, array: Any, places: Any) -> Any:
     return types.none(rows, array, places), code
 
 
-@intrinsic  # type: ignore[untyped-decorator]
+@_compiled
 def columns_at(typing_context: Any, like: Any, array: Any, i: Any) -> Any:
     """Tuple of lanes like another that lies component by component from item i of a line on."""
 
@@ -359,7 +365,7 @@ def columns_at(typing_context: Any, like: Any, array: Any, i: Any) -> Any:
     return like(like, array, i), code
 
 
-@intrinsic  # type: ignore[untyped-decorator]
+@_compiled
 def put_columns(typing_context: Any, columns: Any, array: Any, i: Any) -> Any:
     """Write a tuple of lanes component by component from item i of a line on."""
 

@@ -61,7 +61,14 @@ def damped(action: Any, rate: Any, inert: float, form: int, alpha: float) -> Any
 
 @njit(**INLINED)
 def kicked(
-    v: Any, w: Any, force: Any, moment: Any, m: Any, inert: Any, dt: float, body: Any,
+    v: Any,
+    w: Any,
+    force: Any,
+    moment: Any,
+    m: Any,
+    inert: Any,
+    dt: float,
+    body: Any,
     damping: Damping,
 ) -> Any:
     """Velocity and spin of a grain, or of grains in lanes, one step on: see ``kick``."""
@@ -92,10 +99,16 @@ def kick(
     kind, mass, inertia = grains.kind, grains.mass_of, grains.inertia_of
     for i in range(first, last):
         v, w = kicked(
-            load(dim, velocity, i), load_spin(dim, spin, i),
-            load(dim, force, i), load_spin(dim, moment, i),
-            mass[kind[i]], inertia[kind[i]], dt, body, damping,
-        )  # fmt: skip
+            load(dim, velocity, i),
+            load_spin(dim, spin, i),
+            load(dim, force, i),
+            load_spin(dim, moment, i),
+            mass[kind[i]],
+            inertia[kind[i]],
+            dt,
+            body,
+            damping,
+        )
         store(v, velocity, i)
         store(w, spin, i)
 

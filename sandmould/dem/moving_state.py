@@ -55,9 +55,7 @@ def from_arrays(
     grains, pairs = part(Grains, "grains"), part(Pairs, "pairs")
     bound = chunk_bounds(len(grains.id))
     dim = dim_of(grains.position.shape[1])
-    near = new_near_pairs(
-        dim, len(lanes), bound, grains, pairs, part(Contacts, "contacts"), 0.0
-    )
+    near = new_near_pairs(dim, len(lanes), bound, grains, pairs, part(Contacts, "contacts"), 0.0)
     walls = new_walls(
         part(SurfaceArrays, "surfaces"),
         bound,

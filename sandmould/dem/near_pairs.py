@@ -136,9 +136,11 @@ def contacts_of(dim: Any, bound: Ints, grains: Grains, near: NearPairs) -> Conta
                     rolling[filled, k] = near.history[row, spins + k, lane]
                 filled += 1
     return Contacts(
-        first[:filled].copy(), second[:filled].copy(),
-        friction[:filled].copy(), rolling[:filled].copy(),
-    )  # fmt: skip
+        first[:filled].copy(),
+        second[:filled].copy(),
+        friction[:filled].copy(),
+        rolling[:filled].copy(),
+    )
 
 
 @njit(**OPTIONS)
@@ -163,11 +165,15 @@ def _carry(dim: Any, contacts: Contacts, bound: Ints, near: NearPairs) -> None:
     width, spins = near.grain.shape[1], len(no_spin(dim))
     place = lanes_of(bound, near)
     for c in range(len(contacts.first)):
-        friction, rolling = load_spin(dim, contacts.friction, c), load_spin(dim, contacts.rolling, c)
+        friction, rolling = (
+            load_spin(dim, contacts.friction, c),
+            load_spin(dim, contacts.rolling, c),
+        )
         opposite = of_other(dim, friction), times(rolling, -1.0)
         ends = contacts.first[c], contacts.second[c]
         for i, j, (slides, rolls) in (
-            (ends[0], ends[1], (friction, rolling)), (ends[1], ends[0], opposite)
+            (ends[0], ends[1], (friction, rolling)),
+            (ends[1], ends[0], opposite),
         ):
             s, lane = place[i] // width, place[i] % width
             for row in range(near.first_row[s], near.last_row[s]):
@@ -230,7 +236,10 @@ def _arrange(stop: Ints, touching: Ints, width: int) -> tuple[Ints, Ints]:
     Those that touch others come first: no slice without a contact finds any force.
     """
     n = len(stop)
-    order, rows = np.empty(-(-n // width) * width, dtype=np.int64), np.zeros(-(-n // width), np.int64)
+    order, rows = (
+        np.empty(-(-n // width) * width, dtype=np.int64),
+        np.zeros(-(-n // width), np.int64),
+    )
     ahead = np.empty(2 * _MOST + 3, dtype=np.int64)
     bucket = np.empty(n, dtype=np.int64)
     for first in range(0, n, WINDOW):
@@ -255,9 +264,7 @@ def _arrange(stop: Ints, touching: Ints, width: int) -> tuple[Ints, Ints]:
 
 
 @njit(**OPTIONS)
-def _rows_needed(
-    dim: Any, bound: Ints, grains: Grains, pairs: Pairs, near: NearPairs
-) -> Ints:
+def _rows_needed(dim: Any, bound: Ints, grains: Grains, pairs: Pairs, near: NearPairs) -> Ints:
     """Rows of the near pairs of each chunk, (c,) int64; there is none yet."""
     needed, none = np.zeros(len(bound) - 1, dtype=np.int64), np.zeros(0, dtype=np.int64)
     for c in range(len(needed)):
@@ -268,9 +275,7 @@ def _rows_needed(
 
 
 @njit(**OPTIONS)
-def look(
-    dim: Any, c: int, bound: Ints, grains: Grains, pairs: Pairs, near: NearPairs
-) -> None:
+def look(dim: Any, c: int, bound: Ints, grains: Grains, pairs: Pairs, near: NearPairs) -> None:
     """Choose the near pairs of a chunk anew among the listed ones, and keep their history.
 
     Where the chunk has too little room, they stay as they are and ``near.full`` is set.

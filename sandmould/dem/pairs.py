@@ -89,9 +89,8 @@ def pass_pairs(
     fastest2 = sound = every(lanes, 0.0)
     for s in range(near.first_slice[c], near.first_slice[c + 1]):
         mine = places_at(lanes, grain, s * width)
-        x, v, w = (
-            rows_at(dim, position, mine), rows_at(dim, velocity, mine), rows_at(like_spin, spin, mine)
-        )  # fmt: skip
+        x, v = rows_at(dim, position, mine), rows_at(dim, velocity, mine)
+        w = rows_at(like_spin, spin, mine)
         force_i, moment_i = rows_at(dim, force, mine), rows_at(like_spin, moment, mine)
         kind_i = kinds_at(kind, mine)
         (r,) = rows_at(_NUMBER, radius, kind_i)

@@ -106,14 +106,25 @@ class Solver:
         candidates = Candidates(none, np.zeros(1, dtype=np.uint32), none.copy())
         bound = chunk_bounds(0)
         history = new_history(self._dim, 0)
-        near = new_near_pairs(self._dim, len(self._lanes), bound, grains, pairs, Contacts.none(d), 0.0)
+        near = new_near_pairs(
+            self._dim, len(self._lanes), bound, grains, pairs, Contacts.none(d), 0.0
+        )
         walls = new_walls(self.surfaces.arrays, bound, candidates, history)
         coefficients = pair_up(grains, self.scene.grain_law)
         upright, listed = self._upright(0), np.zeros((0, d))
         return Moving(
-            grains, listed.copy(), coefficients, pairs, near, self._lanes, bound, walls, upright,
-            listed, np.zeros(1),
-        )  # fmt: skip
+            grains,
+            listed.copy(),
+            coefficients,
+            pairs,
+            near,
+            self._lanes,
+            bound,
+            walls,
+            upright,
+            listed,
+            np.zeros(1),
+        )
 
     def _upright(self, n: int) -> Floats:
         """Orientations of grains not turned yet."""
@@ -268,7 +279,13 @@ class Solver:
         """Choose the near pairs anew, with room for all of them."""
         moving, gap_m = self.moving, float(self.moving.near.gap[0])
         near = new_near_pairs(
-            self._dim, len(self._lanes), moving.bound, moving.grains, moving.pairs, self.contacts, gap_m
+            self._dim,
+            len(self._lanes),
+            moving.bound,
+            moving.grains,
+            moving.pairs,
+            self.contacts,
+            gap_m,
         )
         self.moving = moving._replace(near=near)
 

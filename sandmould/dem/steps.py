@@ -156,15 +156,32 @@ def exchanged(grains: Grains, ahead: Floats) -> tuple[Grains, Floats]:
     Their velocities and spins stand where forces and moments stood, and the other way round.
     """
     return Grains(
-        grains.id, ahead, grains.force, grains.moment, grains.kind, grains.radius_of,
-        grains.mass_of, grains.inertia_of, grains.velocity, grains.spin,
-    ), grains.position  # fmt: skip
+        grains.id,
+        ahead,
+        grains.force,
+        grains.moment,
+        grains.kind,
+        grains.radius_of,
+        grains.mass_of,
+        grains.inertia_of,
+        grains.velocity,
+        grains.spin,
+    ), grains.position
 
 
 @njit(**OPTIONS)
 def step_chunk(
-    dim: Any, c: int, scene: DemScene, moving: Moving, grains: Grains, ahead: Floats,
-    shift: Any, speed: Any, body: Any, dt: float, moves: bool,
+    dim: Any,
+    c: int,
+    scene: DemScene,
+    moving: Moving,
+    grains: Grains,
+    ahead: Floats,
+    shift: Any,
+    speed: Any,
+    body: Any,
+    dt: float,
+    moves: bool,
 ) -> float:
     """Find all forces on the grains of a chunk, and let them move on where another step follows.
 
@@ -200,9 +217,19 @@ def step_chunk(
         walls.due,
     )
     fastest2 = pass_pairs(
-        dim, moving.lanes, c, grains, ahead, moving.coefficients, moving.near, scene.grain_law,
-        scene.damping, body, dt, moves,
-    )  # fmt: skip
+        dim,
+        moving.lanes,
+        c,
+        grains,
+        ahead,
+        moving.coefficients,
+        moving.near,
+        scene.grain_law,
+        scene.damping,
+        body,
+        dt,
+        moves,
+    )
     if moves and len(moving.orientation):
         turn(dim, first, last, grains.moment, moving.orientation, dt)
     return fastest2

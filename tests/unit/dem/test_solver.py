@@ -86,10 +86,8 @@ def test_every_near_pair_is_listed_with_both_grains(dimension: int, seed: int) -
     order, start = sort_into_cells(grains.position, grid)
     pairs = list_pairs(grains.ordered(order), start, grid, skin)
     first = np.repeat(np.arange(300), np.diff(pairs.start))
-    found = {
-        pair
-        for pair in zip(order[first].tolist(), order[pairs.other.astype(int)].tolist(), strict=True)
-    }
+    other = order[pairs.other.astype(int)]
+    found = set(zip(order[first].tolist(), other.tolist(), strict=True))
     apart = np.linalg.norm(grains.position[:, None] - grains.position[None], axis=2)
     near = apart < grains.radius[:, None] + grains.radius[None] + skin
     np.fill_diagonal(near, False)
@@ -157,12 +155,12 @@ def test_listing_again_changes_nothing(dimension: int) -> None:
 
 def near_of(made: Solver) -> int:
     """Near pairs, each with both of its grains."""
-    near, n = made.moving.near, len(made.grains.id)
+    near = made.moving.near
     place = lanes_of(made.moving.bound, near)
     width = near.grain.shape[1]
     return sum(
         int((near.other[near.first_row[s] : near.last_row[s], lane] != i).sum())
-        for i, (s, lane) in zip(range(n), zip(place // width, place % width))
+        for i, (s, lane) in enumerate(zip(place // width, place % width, strict=True))
     )
 
 
@@ -177,7 +175,13 @@ def test_looks_for_near_pairs_change_no_bit(
         always.moving.near.left[:] = -1.0
         moving = never.moving
         whole = new_near_pairs(
-            never._dim, len(never._lanes), moving.bound, moving.grains, moving.pairs, never.contacts, 1.0
+            never._dim,
+            len(never._lanes),
+            moving.bound,
+            moving.grains,
+            moving.pairs,
+            never.contacts,
+            1.0,
         )
         whole.left[:] = np.inf
         never.moving = moving._replace(near=whole)
