@@ -20,17 +20,10 @@ ENGINES = {
     "lammps": ("#D55E00", "s"),
     "liggghts": ("#009E73", "^"),
 }
-_PARTS = {
-    "the loop over grains": "#999999",
-    "pairs apart": "#56B4E9",
-    "contacts": "#0072B2",
-    "guessing which": "#E69F00",
-    "surfaces": "#009E73",
-    "gather": "#F0E442",
-    "kick": "#CC79A7",
-    "drift": "#D55E00",
-    "rest": "#FFFFFF",
-}
+_PART_COLOURS = (
+    "#999999", "#56B4E9", "#0072B2", "#E69F00", "#009E73", "#CC79A7", "#FFFFFF", "#F0E442",
+    "#D55E00",
+)  # fmt: skip
 _LIMITS = {
     "bandwidth": "v", "vector arithmetic": "s", "scalar arithmetic": "D", "quotients and roots": "X"
 }  # fmt: skip
@@ -92,7 +85,7 @@ def _limits(ax: Axes, beds: list[dict[str, Any]]) -> None:
     y = np.arange(len(beds))[::-1]
     left = np.zeros(len(beds))
     parts_of_beds = [_parts_of(bed) for bed in beds]
-    for name, colour in _PARTS.items():
+    for name, colour in zip(parts_of_beds[0], _PART_COLOURS, strict=False):
         width = np.maximum(0.0, [parts[name] for parts in parts_of_beds])
         ax.barh(y, width, 0.4, left, color=colour, edgecolor="black", lw=0.4, label=name)
         left += width

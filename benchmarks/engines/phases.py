@@ -3,21 +3,20 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from itertools import pairwise
 from typing import Any
 
 import numpy as np
 
 from benchmarks.engines.timing import interleaved, seconds, spread
 from sandmould.compiled import njit
-from sandmould.dem.motion import drift, kick
-from sandmould.dem.pairs import gather_incoming, pair_forces
+from sandmould.dem.near_pairs import contacts_of, new_near_pairs
+from sandmould.dem.neighbours import Pairs
+from sandmould.dem.pairs import pass_pairs
 from sandmould.dem.solver import Solver
-from sandmould.dem.steps import DemScene, Moving
-from sandmould.dem.surface_contacts import surface_forces
+from sandmould.dem.steps import DemScene, Moving, step_chunk
 from sandmould.dem.vectors import OPTIONS, dim_of, no_vector
 
-PARTS = ("pairs", "surfaces", "gather", "kick", "drift")
+PARTS = ("pairs", "surfaces", "way")
 """Parts of a step in their order."""
 
 
@@ -25,46 +24,32 @@ PARTS = ("pairs", "surfaces", "gather", "kick", "drift")
 def _part_of_steps(dim: Any, parts: int, times: int, scene: DemScene, moving: Moving) -> None:
     """Do the first parts of a step over and over, chunk by chunk as the step loop does.
 
-    Nothing moves: the kick and the drift last for no time, and cost what they always cost.
+    Nothing moves: the next places are written beside those of now.
     """
-    grains, walls, bound = moving.grains, moving.walls, moving.bound
+    grains, ahead, none = moving.grains, moving.ahead, no_vector(dim)
     for _ in range(times):
-        for c in range(len(bound) - 1):
-            first, last = bound[c], bound[c + 1]
-            pair_forces(
-                dim, c, bound, grains, moving.coefficients, moving.near, scene.grain_law, scene.dt
-            )
+        for c in range(len(moving.bound) - 1):
             if parts > 1:
-                surface_forces(
-                    dim, walls.first_row[c], walls.first_row[c + 1], walls.candidates,
-                    grains.position, grains.velocity, grains.spin, grains.kind,
-                    grains.radius_of, grains.mass_of,
-                    grains.force, grains.moment, walls.arrays, no_vector(dim), no_vector(dim),
-                    scene.wall_law, scene.dt, True, walls.history, walls.loads[c],
-                    walls.travel[0], walls.due,
+                step_chunk(
+                    dim, c, scene, moving, grains, ahead, none, none, scene.gravity, scene.dt,
+                    parts > 2,
                 )  # fmt: skip
-            if parts > 2:
-                gather_incoming(dim, c, moving.near, grains)
-            if parts > 3:
-                kick(dim, first, last, grains, scene.gravity, scene.damping, 0.0)
-            if parts > 4:
-                drift(dim, first, last, grains, 0.0)
+            else:
+                pass_pairs(
+                    dim, moving.lanes, c, grains, ahead, moving.coefficients, moving.near,
+                    scene.grain_law, scene.damping, scene.gravity, scene.dt, False,
+                )  # fmt: skip
 
 
-def _with_near(moving: Moving, chosen: np.ndarray) -> Moving:
-    """Keep some of the near pairs of grains; those of a chunk move up to its front."""
-    near, bound = moving.near, moving.bound
-    rows = {
-        name: getattr(near, name).copy() for name in ("other", "touching", "friction", "rolling")
-    }
-    stop = near.stop.copy()
-    for first, (begin, end) in zip(near.first, pairwise(bound), strict=False):
-        before = np.concatenate([[0], np.cumsum(chosen[first : near.stop[end - 1]])])
-        stop[begin:end] = first + before[near.stop[begin:end] - first]
-        kept = first + np.flatnonzero(chosen[first : near.stop[end - 1]])
-        for array in rows.values():
-            array[first : first + len(kept)] = array[kept]
-    return moving._replace(near=near._replace(stop=stop, **rows))
+def _with_near(moving: Moving, chosen: np.ndarray, gap_m: float) -> Moving:
+    """Choose the near pairs among some of the listed ones."""
+    grains, pairs = moving.grains, moving.pairs
+    counted = np.concatenate([[0], np.cumsum(chosen)])[pairs.start]
+    some = Pairs(counted.astype(np.uint32), pairs.other[chosen])
+    dim, width = dim_of(grains.position.shape[1]), len(moving.lanes)
+    contacts = contacts_of(dim, moving.bound, grains, moving.near)
+    near = new_near_pairs(dim, width, moving.bound, grains, some, contacts, gap_m)
+    return moving._replace(near=near)
 
 
 def _block(solver: Solver, moving: Moving, parts: int, block_s: float) -> Callable[[], float]:
@@ -85,8 +70,8 @@ def measure_phases(
     """Time of each part of a step, and what makes up the one of the pairs; spoils the state.
 
     Each part is the difference of a step with it and a step without it, so that it finds the
-    cache as it does in the step loop. Lists of the touching pairs alone and of the others alone
-    have no branch to be guessed: what the whole list takes beyond both is the price of guessing.
+    cache as it does in the step loop. What the whole list takes beyond lists of the touching pairs
+    alone and of the others alone is the price of their sharing rows.
 
     Parameters
     ----------
@@ -103,13 +88,16 @@ def measure_phases(
     """
     moving = solver.moving  # what the step loop itself is given
     moving.near.gap[0] = -1.0  # no look is due
-    touching = moving.near.touching.astype(bool)
+    grains, pairs, gap_m = moving.grains, moving.pairs, 2.0 * float(moving.near.left[0])
+    first = np.repeat(np.arange(len(grains.id)), np.diff(pairs.start))
+    apart_m = np.linalg.norm(grains.position[pairs.other] - grains.position[first], axis=1)
+    touching = apart_m < grains.radius[pairs.other] + grains.radius[first]
     blocks = {
         name: _block(solver, moving, i + 1, block_s) for i, name in enumerate(PARTS)
     } | {
-        "touching": _block(solver, _with_near(moving, touching), 1, block_s),
-        "apart": _block(solver, _with_near(moving, ~touching), 1, block_s),
-        "no pairs": _block(solver, _with_near(moving, np.zeros_like(touching)), 1, block_s),
+        "touching": _block(solver, _with_near(moving, touching, gap_m), 1, block_s),
+        "apart": _block(solver, _with_near(moving, ~touching, gap_m), 1, block_s),
+        "no pairs": _block(solver, _with_near(moving, np.zeros_like(touching), gap_m), 1, block_s),
     }  # fmt: skip
     times = interleaved(blocks | {"step": step}, rounds)
     sums = np.array([times[name] for name in (*PARTS, "step")])
@@ -119,7 +107,7 @@ def measure_phases(
         "the loop over grains": bare,
         "pairs apart": apart - bare,
         "contacts": touch - bare,
-        "guessing which": parts[0] - touch - apart + bare,
+        "mixed rows": parts[0] - touch - apart + bare,
     }
     names = (*PARTS, "rest")
     return {

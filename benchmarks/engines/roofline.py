@@ -12,7 +12,8 @@ from benchmarks.engines.timing import Extent, one_core, spread, steps_lasting
 from sandmould.dem.solver import Solver
 
 # Operations counted by hand in pairs.py, contact_law.py and motion.py; a multiply-add is two,
-# comparisons, signs and what leaves the loop are none. First discs, then spheres.
+# comparisons, signs and what leaves the loop are none. Both grains compute each pair. First discs,
+# then spheres.
 FLOPS_PER_PAIR = (
     ("vector between the centres", 2, 3),
     ("its square", 3, 5),
@@ -24,9 +25,9 @@ FLOPS_PER_CONTACT = (
     ("normal force, (16)-(21)", 6, 8),
     ("spin at the contact point", 3, 18),
     ("friction: advanced, turned, limited, (24)-(28)", 8, 33),
-    ("force and moments on both grains", 8, 21),
+    ("force and moment on the grain", 5, 15),
     ("rolling moment: advanced, turned, limited, (29)-(33)", 7, 37),
-    ("sums over the contacts of both grains", 6, 12),
+    ("sums over the contacts of the grain", 3, 6),
 )
 FLOPS_PER_GRAIN = (
     ("sums stored", 3, 6),
@@ -40,16 +41,15 @@ QUOTIENTS_PER_GRAIN = 2
 CHAINED_PER_CONTACT = {2: 1, 3: 2}
 """Of these, what waits for each other: distance, then the limit of friction."""
 TRAFFIC = {
-    "grains position": 2, "grains velocity": 2, "grains spin": 2, "grains kind": 1,
-    "grains force": 2,
-    "grains moment": 2, "near stop": 1, "near other": 1, "near touching": 2,
-    "near friction": 2, "near rolling": 2, "near slot": 1, "near slot_grain": 1,
-    "near slot_force": 2, "near slot_moment": 2, "walls candidates rows": 1,
+    "grains position": 1, "grains velocity": 1, "grains spin": 1, "grains kind": 1,
+    "grains force": 2, "grains moment": 2, "ahead": 2, "near grain": 1, "near first_row": 1,
+    "near last_row": 1, "near other": 1, "near held": 2, "near history": 2,
+    "walls candidates rows": 1,
     "walls candidates start": 1, "walls candidates part": 1, "walls history used": 2,
     "walls history normal": 2, "walls history friction": 2, "walls history rolling": 2,
 }  # fmt: skip
-"""How often a step takes an array from memory or gives it back: once read, once written. A chunk
-stays in the core's cache from its first contact to its drift."""
+"""How often a step takes an array from memory or gives it back: once read, once written; what is
+written is read first."""
 
 
 def flops(dimension: int, near: float, contacts: float) -> float:
@@ -58,7 +58,7 @@ def flops(dimension: int, near: float, contacts: float) -> float:
         sum(row[1:][dimension - 2] for row in counted)
         for counted in (FLOPS_PER_PAIR, FLOPS_PER_CONTACT, FLOPS_PER_GRAIN)
     )
-    return near * per_pair + contacts * per_contact + per_grain
+    return 2.0 * (near * per_pair + contacts * per_contact) + per_grain
 
 
 def traffic_bytes(solver: Solver) -> float:
@@ -72,7 +72,7 @@ def _bounds(
 ) -> dict[str, float]:
     """Least time of a grain-step by each limit, ns."""
     operations = flops(solver.dimension, near, contacts)
-    roots = contacts * ROOTS_PER_CONTACT[solver.dimension]
+    roots = 2.0 * contacts * ROOTS_PER_CONTACT[solver.dimension]
     return {
         "bandwidth": traffic_bytes(solver) / gb_s,
         "vector arithmetic": operations * peaks["vector_ns_per_flop"]["median"],
@@ -100,7 +100,7 @@ def _measure_bed(bed: Bed, peaks: dict[str, Any], extent: Extent, phases: bool) 
     """Time of a step against its limits."""
     solver, times = _times(bed, extent, phases)
     step_ns, pairs = times["ns_per_grain_step"]["median"], solver.moving.pairs
-    listed, contacts = len(pairs.other) / bed.grains, len(solver.contacts.first) / bed.grains
+    listed, contacts = 0.5 * len(pairs.other) / bed.grains, len(solver.contacts.first) / bed.grains
     near = near_of(solver) / bed.grains
     held = sum(size for name, size in bytes_of(solver).items() if name in TRAFFIC)
     gb_s = bandwidth(held, extent.rounds)

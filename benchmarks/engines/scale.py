@@ -86,10 +86,9 @@ def measure_threads(extent: Extent) -> dict[str, Any]:
 
 
 def near_of(solver: Solver) -> int:
-    """Near pairs now."""
-    moving = solver.moving
-    last = moving.near.stop[moving.bound[1:] - 1]
-    return int((last - moving.near.first[:-1]).sum())
+    """Near pairs now, with the empty lanes beside them."""
+    near = solver.moving.near
+    return int((near.last_row - near.first_row).sum()) * near.grain.shape[1] // 2
 
 
 def bytes_of(solver: Solver) -> dict[str, int]:
@@ -107,7 +106,8 @@ def bytes_of(solver: Solver) -> dict[str, int]:
         for part, arrays in parts.items()
         for field, array in arrays._asdict().items()
     }
-    return sizes | {"walls loads": moving.walls.loads.nbytes, "listed": moving.listed.nbytes}
+    others = {"ahead": moving.ahead, "walls loads": moving.walls.loads, "listed": moving.listed}
+    return sizes | {name: array.nbytes for name, array in others.items()}
 
 
 def _memory(solver: Solver) -> dict[str, Any]:
@@ -115,7 +115,7 @@ def _memory(solver: Solver) -> dict[str, Any]:
     n, pairs = len(solver.grains.id), solver.moving.pairs
     return {
         "grains": n,
-        "listed_per_grain": len(pairs.other) / n,
+        "listed_per_grain": 0.5 * len(pairs.other) / n,
         "contacts_per_grain": len(solver.contacts.first) / n,
         "bytes_per_grain": {name: size / n for name, size in bytes_of(solver).items()},
     }

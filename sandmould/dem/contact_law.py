@@ -9,6 +9,7 @@ import math
 from typing import Any, NamedTuple
 
 from sandmould.compiled import njit
+from sandmould.dem.lanes import fused
 from sandmould.dem.vectors import (
     INLINED,
     dot,
@@ -157,12 +158,13 @@ def contact(
     others, slips a little in every step, always the same way (docs/developers/size_ratio.md).
     """
     approach = dot(v, n)
-    normal = law.k_n * overlap - sizes.damping * approach
-    least = 0.0 if law.clip_total else -math.inf
-    normal = normal if normal > least else least
-    # Slip of body 2 over body 1 drags body 1 along: the sign that (25) needs under (14).
-    spun = spin_slip(n, turned_spin(n, plus(times(w_1, arm_1), arm_2, w_2), turn, v))
-    moved = law.k_t * dt * (1.0 + turn * approach)
+    normal = fused(-sizes.damping, approach, law.k_n * overlap)
+    normal = max(normal, 0.0 if law.clip_total else -math.inf)
+    # Slip of body 2 over body 1 drags body 1 along: the sign that (25) needs under (14). Both
+    # bodies find the same digits: nothing here rounds by which of them is the first.
+    rolled = plus(times(w_1, arm_1), 1.0, times(w_2, arm_2))
+    spun = spin_slip(n, turned_spin(n, rolled, turn, v))
+    moved = law.k_t * dt * fused(turn, approach, 1.0)
     friction = plus(tangent_after(n, friction, moved, v), -law.k_t * dt, spun)
     friction = limited(friction, law.friction * abs(normal))
     force = plus(in_space(n, friction), -normal, n)

@@ -9,9 +9,9 @@ from __future__ import annotations
 import numpy as np
 
 from sandmould.compiled import njit
-from sandmould.dem.contact_law import Law, PairCoefficients, pair_coefficients
+from sandmould.dem.contact_law import Law, pair_coefficients
 from sandmould.dem.grains import Floats, Grains
-from sandmould.dem.vectors import INLINED, OPTIONS
+from sandmould.dem.vectors import OPTIONS
 
 
 @njit(**OPTIONS)
@@ -22,18 +22,6 @@ def _pair_up(radius: Floats, mass: Floats, law: Law, coefficients: Floats) -> No
             coefficients[i, j] = pair_coefficients(
                 law, m_i * m_j / (m_i + m_j), min(r_i, r_j), r_i * r_j / (r_i + r_j)
             )
-
-
-@njit(**INLINED)
-def pair_coefficients_of(
-    coefficients: Floats, kind_1: int | np.uint64, kind_2: int | np.uint64
-) -> PairCoefficients:
-    """Give what two kinds make of each other."""
-    return PairCoefficients(
-        coefficients[kind_1, kind_2, 0],
-        coefficients[kind_1, kind_2, 1],
-        coefficients[kind_1, kind_2, 2],
-    )
 
 
 def pair_up(grains: Grains, law: Law) -> Floats:

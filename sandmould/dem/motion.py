@@ -7,6 +7,7 @@ from typing import Any, NamedTuple
 
 from sandmould.compiled import njit
 from sandmould.dem.grains import Floats, Grains
+from sandmould.dem.lanes import where
 from sandmould.dem.vectors import (
     INLINED,
     OPTIONS,
@@ -14,8 +15,6 @@ from sandmould.dem.vectors import (
     dot,
     load,
     load_spin,
-    no_spin,
-    no_vector,
     plus,
     rotate,
     store,
@@ -53,11 +52,29 @@ def damped(action: Any, rate: Any, inert: float, form: int, alpha: float) -> Any
         return plus(action, -alpha * inert, rate)
     if form == ISOTROPIC:
         rate2 = dot(rate, rate)
-        if rate2 > 0.0:
-            return plus(action, -alpha * math.sqrt(dot(action, action) / rate2), rate)
-    elif form == COMPONENTWISE:
+        rate2 = where(rate2 > 0.0, rate2, math.inf)
+        return plus(action, -alpha * math.sqrt(dot(action, action) / rate2), rate)
+    if form == COMPONENTWISE:
         return damped_by_component(action, rate, alpha)
     return action
+
+
+@njit(**INLINED)
+def kicked(
+    v: Any,
+    w: Any,
+    force: Any,
+    moment: Any,
+    m: Any,
+    inert: Any,
+    dt: float,
+    body: Any,
+    damping: Damping,
+) -> Any:
+    """Velocity and spin of a grain, or of grains in lanes, one step on: see ``kick``."""
+    push = damped(plus(force, m, body), v, m, damping.form, damping.translation)
+    torque = damped(moment, w, inert, damping.form, damping.rotation)
+    return plus(v, dt / m, push), plus(w, dt / inert, torque)
 
 
 @njit(**OPTIONS)
@@ -80,40 +97,36 @@ def kick(
     """
     velocity, spin, force, moment = grains.velocity, grains.spin, grains.force, grains.moment
     kind, mass, inertia = grains.kind, grains.mass_of, grains.inertia_of
-    # Quotients are found once for each kind.
-    per_mass, per_inertia = dt / mass, dt / inertia
     for i in range(first, last):
-        k = kind[i]
-        m, v = mass[k], load(dim, velocity, i)
-        push = plus(load(dim, force, i), m, body)
-        push = damped(push, v, m, damping.form, damping.translation)
-        store(plus(v, per_mass[k], push), velocity, i)
-        inert, w = inertia[k], load_spin(dim, spin, i)
-        torque = damped(load_spin(dim, moment, i), w, inert, damping.form, damping.rotation)
-        store(plus(w, per_inertia[k], torque), spin, i)
+        v, w = kicked(
+            load(dim, velocity, i),
+            load_spin(dim, spin, i),
+            load(dim, force, i),
+            load_spin(dim, moment, i),
+            mass[kind[i]],
+            inertia[kind[i]],
+            dt,
+            body,
+            damping,
+        )
+        store(v, velocity, i)
+        store(w, spin, i)
 
 
 @njit(**OPTIONS)
 def drift(dim: Any, first: int, last: int, grains: Grains, dt: float) -> float:
-    """Advance positions of some grains, eq. (5), and clear their forces.
+    """Advance positions of some grains, eq. (5).
 
     Returns
     -------
     float, m2/s2
         Largest squared speed; not a number as soon as one speed is none.
     """
-    position, velocity, force, moment = (
-        grains.position,
-        grains.velocity,
-        grains.force,
-        grains.moment,
-    )
+    position, velocity = grains.position, grains.velocity
     largest2, sound = 0.0, 0.0
     for i in range(first, last):
         v = load(dim, velocity, i)
         store(plus(load(dim, position, i), dt, v), position, i)
-        store(no_vector(dim), force, i)
-        store(no_spin(dim), moment, i)
         speed2 = dot(v, v)
         sound += speed2
         largest2 = max(largest2, speed2)
@@ -121,7 +134,7 @@ def drift(dim: Any, first: int, last: int, grains: Grains, dt: float) -> float:
 
 
 @njit(**OPTIONS)
-def turn(dim: Any, first: int, last: int, grains: Grains, orientation: Floats, dt: float) -> None:
+def turn(dim: Any, first: int, last: int, spin: Floats, orientation: Floats, dt: float) -> None:
     """Advance orientations, eqs. (8)-(13): angles (n, 1) in 2D, matrices (n, 9) in 3D."""
     for i in range(first, last):
-        rotate(times(load_spin(dim, grains.spin, i), dt), orientation, i)
+        rotate(times(load_spin(dim, spin, i), dt), orientation, i)

@@ -26,7 +26,7 @@ def to_arrays(moving: Moving) -> dict[str, np.ndarray]:
     parts: dict[str, Any] = {
         "grains": moving.grains,
         "pairs": moving.pairs,
-        "contacts": contacts_of(dim, moving.bound, moving.near),
+        "contacts": contacts_of(dim, moving.bound, moving.grains, moving.near),
         "candidates": walls.candidates,
         "history": walls.history,
         "surfaces": walls.arrays,
@@ -44,7 +44,9 @@ def to_arrays(moving: Moving) -> dict[str, np.ndarray]:
     }
 
 
-def from_arrays(arrays: Mapping[str, np.ndarray], grain_law: Law) -> Moving:
+def from_arrays(
+    arrays: Mapping[str, np.ndarray], grain_law: Law, lanes: tuple[float, ...]
+) -> Moving:
     """What ``to_arrays`` kept, with no loads collected yet."""
 
     def part(kind: Any, name: str) -> Any:
@@ -53,7 +55,7 @@ def from_arrays(arrays: Mapping[str, np.ndarray], grain_law: Law) -> Moving:
     grains, pairs = part(Grains, "grains"), part(Pairs, "pairs")
     bound = chunk_bounds(len(grains.id))
     dim = dim_of(grains.position.shape[1])
-    near = new_near_pairs(dim, bound, grains, pairs, part(Contacts, "contacts"), 0.0)
+    near = new_near_pairs(dim, len(lanes), bound, grains, pairs, part(Contacts, "contacts"), 0.0)
     walls = new_walls(
         part(SurfaceArrays, "surfaces"),
         bound,
@@ -62,9 +64,11 @@ def from_arrays(arrays: Mapping[str, np.ndarray], grain_law: Law) -> Moving:
     )
     return Moving(
         grains,
+        np.empty_like(grains.position),
         pair_up(grains, grain_law),
         pairs,
         near,
+        lanes,
         bound,
         walls._replace(listed=arrays["listed_vertices"]),
         arrays["orientation"],

@@ -3,7 +3,12 @@
 Most listed pairs lie further apart than grains go in many steps. A look at all of them keeps the
 pairs with a gap below some length; none of the others can touch before the two grains have gone
 that far between them. So no contact is missed, and no digit depends on when a look is taken. Only
-near pairs have a history, one after the other in memory.
+near pairs have a history.
+
+Near pairs lie in slices of W grains, one a lane. A slice has as many rows as its grain with most
+near pairs, and a row has one pair of each grain, in the order of the listed ones. A pair stands
+with both of its grains, each with a history of its own: opposite ones, digit by digit. Within a
+window grains with about as many pairs share a slice, so few lanes are empty. No digit depends on W.
 """
 
 from __future__ import annotations
@@ -16,7 +21,6 @@ from numpy.typing import NDArray
 
 from sandmould.arrays import Places
 from sandmould.compiled import njit
-from sandmould.dem.chunks import chunk_of, farthest_chunk
 from sandmould.dem.grains import Floats, Grains, Ints
 from sandmould.dem.neighbours import Pairs
 from sandmould.dem.vectors import (
@@ -26,7 +30,7 @@ from sandmould.dem.vectors import (
     load,
     load_spin,
     no_spin,
-    no_vector,
+    of_other,
     plus,
     store,
     times,
@@ -35,6 +39,10 @@ from sandmould.dem.vectors import (
 GAP_FACTOR = 2.0
 """Near is what has a gap below this times the root of skin times way per step: a longer gap has
 more pairs that do not touch, a shorter one asks for more looks. Estimated, not tuned."""
+WINDOW = 128
+"""Grains among which those of a slice are chosen."""
+_MOST = 64
+"""Near pairs from which on a grain stands in front of its window."""
 
 
 class Contacts(NamedTuple):
@@ -57,34 +65,26 @@ class Contacts(NamedTuple):
 
 
 class NearPairs(NamedTuple):
-    """Near pairs; those of a chunk fill the front of the room that the chunk has."""
+    """Near pairs of both grains; the rows of a chunk fill the front of the room that it has."""
 
+    first_slice: Ints
+    """(c + 1,) int64: first slice of each chunk."""
+    grain: Places
+    """(slices, W) uint32: the grain of each lane; behind the last of a chunk it is repeated, with
+    all its pairs."""
+    first_row: Ints
+    """(slices,) int64: where the rows of each slice begin."""
+    last_row: Ints
+    """(slices,) int64: and end."""
     first: Ints
-    """(c + 1,) int64: where the room of each chunk begins."""
-    stop: Places
-    """(n,) uint32: where the pairs of a grain end; they begin where those of the grain before end,
-    or, for the first grain of a chunk, where the room of the chunk begins."""
+    """(c + 1,) int64: where the room of each chunk begins, in rows."""
     other: Places
-    """(p,) uint32: the second grain."""
-    touching: NDArray[np.uint8]
-    """(p,) uint8: whether the pair touched at the last step."""
-    friction: Floats
-    """(p, s) float64, N: as in ``Contacts``; zero where a pair does not touch."""
-    rolling: Floats
-    """(p, s) float64, N m: likewise."""
-    first_slot: Ints
-    """(c + 1,) int64: where the room of each chunk for slots begins."""
-    slot_bound: Ints
-    """(c, f) int64: the slots of a chunk for the chunk t later begin with slot_bound[c, t - 1] and
-    end before slot_bound[c, t]."""
-    slot: Places
-    """(q,) uint32: slots of those pairs that cross to a later chunk, from its first slot on."""
-    slot_grain: Places
-    """(q,) uint32: the second grain, in the order of slots as the next two."""
-    slot_force: Floats
-    """(q, d) float64, N: what the pair puts on it."""
-    slot_moment: Floats
-    """(q, s) float64, N m."""
+    """(rows, W) uint32: the other grain of the pair; the grain itself where a lane is empty."""
+    held: NDArray[np.uint8]
+    """(rows,) uint8: whether a pair of the row touched at the last step."""
+    history: Floats
+    """(rows, 2 s, W) float64, N and N m: friction and rolling moment on the grain of the lane, as
+    in ``Contacts``; zero where the pair does not touch."""
     left: Floats
     """(1,) float64, m: how far any grain can still go before a look is due."""
     gap: Floats
@@ -94,30 +94,53 @@ class NearPairs(NamedTuple):
 
 
 @njit(**OPTIONS)
-def contacts_of(dim: Any, bound: Ints, near: NearPairs) -> Contacts:
-    """Touching pairs of grains, ``bound`` being the first grains of the chunks."""
-    stop, other, touching = near.stop, near.other, near.touching
-    near_friction, near_rolling = near.friction, near.rolling
-    contacts = 0
+def lanes_of(bound: Ints, near: NearPairs) -> Ints:
+    """Where each grain stands: slice times W plus lane, (n,) int64."""
+    width, place = near.grain.shape[1], np.empty(bound[-1], dtype=np.int64)
     for c in range(len(bound) - 1):
-        if bound[c + 1] > bound[c]:
-            for k in range(near.first[c], stop[bound[c + 1] - 1]):
-                contacts += touching[k]
-    first, second = np.empty(contacts, dtype=np.int64), np.empty(contacts, dtype=np.int64)
-    friction = np.empty((contacts, len(no_spin(dim))))
-    rolling = np.empty((contacts, len(no_spin(dim))))
+        for k in range(bound[c + 1] - bound[c]):
+            s = near.first_slice[c] + k // width
+            place[near.grain[s, k % width]] = s * width + k % width
+    return place
+
+
+@njit(**OPTIONS)
+def contacts_of(dim: Any, bound: Ints, grains: Grains, near: NearPairs) -> Contacts:
+    """Pairs that touch or have a history, ``bound`` being the first grains of the chunks."""
+    width, spins = near.grain.shape[1], len(no_spin(dim))
+    place = lanes_of(bound, near)
+    most = 0
+    for s in range(len(near.first_row)):
+        most += near.last_row[s] - near.first_row[s]
+    most = (most * width + 1) // 2
+    first, second = np.empty(most, dtype=np.int64), np.empty(most, dtype=np.int64)
+    friction, rolling = np.empty((most, spins)), np.empty((most, spins))
+    position, kind, radius = grains.position, grains.kind, grains.radius_of
     filled = 0
-    for c in range(len(bound) - 1):
-        k = near.first[c]
-        for i in range(bound[c], bound[c + 1]):
-            while k < stop[i]:
-                if touching[k]:
-                    first[filled], second[filled] = i, other[k]
-                    store(load_spin(dim, near_friction, k), friction, filled)
-                    store(load_spin(dim, near_rolling, k), rolling, filled)
-                    filled += 1
-                k += 1
-    return Contacts(first, second, friction, rolling)
+    for i in range(len(place)):
+        s, lane = place[i] // width, place[i] % width
+        x, r = load(dim, position, i), radius[kind[i]]
+        for row in range(near.first_row[s], near.last_row[s]):
+            j = np.int64(near.other[row, lane])
+            if j <= i:
+                continue
+            apart = plus(load(dim, position, j), -1.0, x)
+            reach = r + radius[kind[j]]
+            counts = dot(apart, apart) < reach * reach
+            for k in range(2 * spins):
+                counts = counts or near.history[row, k, lane] != 0.0
+            if counts:
+                first[filled], second[filled] = i, j
+                for k in range(spins):
+                    friction[filled, k] = near.history[row, k, lane]
+                    rolling[filled, k] = near.history[row, spins + k, lane]
+                filled += 1
+    return Contacts(
+        first[:filled].copy(),
+        second[:filled].copy(),
+        friction[:filled].copy(),
+        rolling[:filled].copy(),
+    )
 
 
 @njit(**OPTIONS)
@@ -131,118 +154,212 @@ def move_contacts(dim: Any, contacts: Contacts, order: Ints) -> None:
     for k in range(len(first)):
         a, b = place[first[k]], place[second[k]]
         first[k], second[k] = min(a, b), max(a, b)
-        if a > b:  # what acts on the other grain is opposite; the tangent of 2D turns round with it
+        if a > b:
+            store(of_other(dim, load_spin(dim, friction, k)), friction, k)
             store(times(load_spin(dim, rolling, k), -1.0), rolling, k)
-            if len(dim) == 3:
-                store(times(load_spin(dim, friction, k), -1.0), friction, k)
 
 
 @njit(**OPTIONS)
 def _carry(dim: Any, contacts: Contacts, bound: Ints, near: NearPairs) -> None:
-    """Give near pairs the history of the contacts among them."""
-    other, stop, first, touching = near.other, near.stop, near.first, near.touching
-    near_friction, near_rolling = near.friction, near.rolling
-    owner, partner = contacts.first, contacts.second
-    friction, rolling = contacts.friction, contacts.rolling
-    for k in range(len(owner)):
-        i, j = owner[k], partner[k]
-        c = chunk_of(bound, i)
-        begin = first[c] if i == bound[c] else stop[i - 1]
-        for q in range(begin, stop[i]):
-            if other[q] == j:
-                touching[q] = 1
-                store(load_spin(dim, friction, k), near_friction, q)
-                store(load_spin(dim, rolling, k), near_rolling, q)
-                break
+    """Give near pairs the history of the contacts among them, both grains their own."""
+    width, spins = near.grain.shape[1], len(no_spin(dim))
+    place = lanes_of(bound, near)
+    for c in range(len(contacts.first)):
+        friction, rolling = (
+            load_spin(dim, contacts.friction, c),
+            load_spin(dim, contacts.rolling, c),
+        )
+        opposite = of_other(dim, friction), times(rolling, -1.0)
+        ends = contacts.first[c], contacts.second[c]
+        for i, j, (slides, rolls) in (
+            (ends[0], ends[1], (friction, rolling)),
+            (ends[1], ends[0], opposite),
+        ):
+            s, lane = place[i] // width, place[i] % width
+            for row in range(near.first_row[s], near.last_row[s]):
+                if near.other[row, lane] == j:
+                    near.held[row] = 1
+                    for k in range(spins):
+                        near.history[row, k, lane] = slides[k]
+                        near.history[row, spins + k, lane] = rolls[k]
+                    break
 
 
 @njit(**OPTIONS)
 def _choose(
-    dim: Any, bound: Ints, grains: Grains, pairs: Pairs, gap: float
-) -> tuple[Ints, Ints, Places, Places]:
-    """Near pairs among the listed ones.
+    dim: Any,
+    c: int,
+    bound: Ints,
+    grains: Grains,
+    pairs: Pairs,
+    near: NearPairs,
+    place: Ints,
+    kept: Ints,
+) -> tuple[Ints, Ints, Places, Ints]:
+    """Near pairs of a chunk among the listed ones.
 
-    Given are those of each chunk and those of them that cross to a later one, (c,) int64; where
-    those of each grain end, counted from the first of its chunk, (n,) uint32; their second grains.
+    Given are where those of each grain end and how many of them touch, (n,) int64; and of each the
+    other grain, and where the history of its row was kept, or -1.
     """
-    position, kind, radius = grains.position, grains.kind, grains.radius_of
-    start, listed = pairs.start, pairs.other
-    counts = np.zeros(len(bound) - 1, dtype=np.int64)
-    crossing = np.zeros(len(bound) - 1, dtype=np.int64)
-    stop = np.empty(len(position), dtype=np.uint32)
-    other = np.empty(len(listed), dtype=np.uint32)
+    # Names of their own: taking an array out of a tuple inside the loop counts references.
+    start, listed, old_other, width = pairs.start, pairs.other, near.other, near.grain.shape[1]
+    position, kind, radius, gap = grains.position, grains.kind, grains.radius_of, near.gap[0]
+    begin, end, first = bound[c], bound[c + 1], index(near.first[c])
+    stop, touching = np.empty(end - begin, dtype=np.int64), np.zeros(end - begin, dtype=np.int64)
+    other = np.empty(start[end] - start[begin] + 1, dtype=np.uint32)
+    source = np.empty(len(other), dtype=np.int64)
     k = 0
-    for c in range(len(counts)):
-        first, cross, end = k, 0, bound[c + 1]
-        for i in range(bound[c], end):
-            x, reach = load(dim, position, i), radius[kind[i]] + gap
-            for p in range(index(start[i]), index(start[i + 1])):
-                j = listed[p]
-                apart = plus(load(dim, position, j), -1.0, x)
-                far = reach + radius[kind[j]]
-                # Written at all events: a branch here is guessed wrong too often.
-                other[index(k)] = j
-                is_near = dot(apart, apart) < far * far
-                k += is_near
-                cross += is_near & (j >= end)
-            stop[i] = k - first
-        counts[c], crossing[c] = k - first, cross
-    return counts, crossing, stop, other
+    for i in range(begin, end):
+        x, r, touched = load(dim, position, i), radius[kind[i]], 0
+        s, lane = place[i - begin] // width, index(place[i - begin] % width)
+        row, last = index(near.first_row[s]), index(near.last_row[s])
+        for p in range(index(start[i]), index(start[i + 1])):
+            j = listed[p]
+            apart = plus(load(dim, position, j), -1.0, x)
+            distance2, reach = dot(apart, apart), r + radius[kind[j]]
+            # Written at all events: a branch here is guessed wrong too often.
+            other[index(k)], source[index(k)] = j, -1
+            # Rows and listed pairs are in the same order.
+            if row < last and old_other[row, lane] == j:
+                source[index(k)] = kept[row - first]
+                row += index(1)
+            touched += distance2 < reach * reach
+            k += distance2 < (reach + gap) * (reach + gap)
+        stop[i - begin], touching[i - begin] = k, touched
+    return stop, touching, other, source
 
 
 @njit(**OPTIONS)
-def _give_slots(dim: Any, c: int, bound: Ints, near: NearPairs) -> None:
-    """Give near pairs that cross to later chunks their slots, in the order of those chunks."""
-    other, ends, end = near.other, near.slot_bound[c], bound[c + 1]
-    first, last = near.first[c], near.stop[end - 1]
-    ends[:] = 0
-    for k in range(first, last):
-        if other[k] >= end:
-            ends[chunk_of(bound, other[k]) - c] += 1
-    ends[0] = near.first_slot[c]
-    for t in range(1, len(ends)):
-        ends[t] += ends[t - 1]
-    free, crossing = ends.copy(), near.first_slot[c]
-    for k in range(first, last):
-        if other[k] >= end:
-            later = chunk_of(bound, other[k]) - c - 1
-            slot = free[later]
-            free[later] += 1
-            near.slot[crossing], near.slot_grain[slot] = slot, other[k]
-            store(no_vector(dim), near.slot_force, slot)
-            store(no_spin(dim), near.slot_moment, slot)
-            crossing += 1
+def _arrange(stop: Ints, touching: Ints, width: int) -> tuple[Ints, Ints]:
+    """Grains of a chunk, counted from its first, in the order of lanes; and rows of each slice.
+
+    Those that touch others come first: no slice without a contact finds any force.
+    """
+    n = len(stop)
+    order, rows = (
+        np.empty(-(-n // width) * width, dtype=np.int64),
+        np.zeros(-(-n // width), np.int64),
+    )
+    ahead = np.empty(2 * _MOST + 3, dtype=np.int64)
+    bucket = np.empty(n, dtype=np.int64)
+    for first in range(0, n, WINDOW):
+        last = min(first + WINDOW, n)
+        ahead[:] = 0
+        for k in range(first, last):
+            bucket[k] = _MOST - min(stop[k] - (stop[k - 1] if k else 0), _MOST)
+            bucket[k] += 0 if touching[k] else _MOST + 1
+            ahead[bucket[k] + 1] += 1
+        ahead[0] = first
+        for k in range(2 * _MOST + 2):
+            ahead[k + 1] += ahead[k]
+        for k in range(first, last):
+            count = stop[k] - (stop[k - 1] if k else 0)
+            slot = ahead[bucket[k]]
+            ahead[bucket[k]] += 1
+            order[slot] = k
+            rows[slot // width] = max(rows[slot // width], count)
+    for slot in range(n, len(order)):
+        order[slot] = order[n - 1]
+    return order, rows
 
 
 @njit(**OPTIONS)
-def _lay_out(dim: Any, bound: Ints, chosen: Places, near: NearPairs) -> None:
-    """Put chosen pairs into the room of each chunk, and give those that cross their slots."""
-    k = 0
-    for c in range(len(bound) - 1):
-        first, last = bound[c], bound[c + 1]
-        if last > first:
-            room = near.first[c]
-            for q in range(near.stop[last - 1]):
-                near.other[room + q] = chosen[k + q]
-            k += near.stop[last - 1]
-            for i in range(first, last):
-                near.stop[i] += room
-            _give_slots(dim, c, bound, near)
+def _rows_needed(dim: Any, bound: Ints, grains: Grains, pairs: Pairs, near: NearPairs) -> Ints:
+    """Rows of the near pairs of each chunk, (c,) int64; there is none yet."""
+    needed, none = np.zeros(len(bound) - 1, dtype=np.int64), np.zeros(0, dtype=np.int64)
+    for c in range(len(needed)):
+        place = np.zeros(bound[c + 1] - bound[c], dtype=np.int64)
+        stop, touching, _, _ = _choose(dim, c, bound, grains, pairs, near, place, none)
+        needed[c] = _arrange(stop, touching, near.grain.shape[1])[1].sum()
+    return needed
 
 
-def _room(counts: Ints, most: Ints) -> Ints:
-    """Where the room of each chunk begins: for a few more than there are now, (c + 1,) int64."""
-    return np.concatenate([[0], np.minimum(counts + counts // 32 + 16, most).cumsum()])
+@njit(**OPTIONS)
+def look(dim: Any, c: int, bound: Ints, grains: Grains, pairs: Pairs, near: NearPairs) -> None:
+    """Choose the near pairs of a chunk anew among the listed ones, and keep their history.
+
+    Where the chunk has too little room, they stay as they are and ``near.full`` is set.
+
+    Parameters
+    ----------
+    dim : tuple of d floats
+    c : int
+        The chunk.
+    bound : (c + 1,) int64
+        First grains of the chunks.
+    grains : Grains
+    pairs : Pairs
+    near : NearPairs
+        Of this chunk written to.
+    """
+    grain, other, held, history = near.grain, near.other, near.held, near.history
+    first_row, last_row, width = near.first_row, near.last_row, near.grain.shape[1]
+    first_slice, last_slice = near.first_slice[c], near.first_slice[c + 1]
+    begin, first, parts = bound[c], near.first[c], history.shape[1]
+    if last_slice == first_slice:
+        return
+    kept = np.full(last_row[last_slice - 1] - first, -1)
+    rows_kept = 0
+    for row in range(len(kept)):
+        if held[first + row]:
+            kept[row] = rows_kept
+            rows_kept += 1
+    histories = np.empty((rows_kept, parts, width))
+    for row in range(len(kept)):
+        if kept[row] >= 0:
+            for part in range(parts):
+                for lane in range(width):
+                    histories[kept[row], part, lane] = history[first + row, part, lane]
+    place = np.empty(bound[c + 1] - begin, dtype=np.int64)
+    for k in range(len(place)):
+        slot = first_slice * width + k
+        place[grain[slot // width, slot % width] - begin] = slot
+    stop, touching, chosen, source = _choose(dim, c, bound, grains, pairs, near, place, kept)
+    order, rows = _arrange(stop, touching, width)
+    if rows.sum() > near.first[c + 1] - first:
+        near.full[0] = 1
+        return
+    row = first
+    for s in range(len(rows)):
+        end = row + rows[s]
+        first_row[first_slice + s], last_row[first_slice + s] = row, end
+        for q in range(row, end):
+            held[q] = 0
+            for part in range(parts):
+                for lane in range(width):
+                    history[q, part, lane] = 0.0
+        for lane in range(width):
+            k = order[s * width + lane]
+            grain[first_slice + s, lane] = begin + k
+            q, old = row, place[k] % width
+            for p in range(stop[k - 1] if k else 0, stop[k]):
+                other[q, lane] = chosen[p]
+                if source[p] >= 0:
+                    held[q] = 1
+                    for part in range(parts):
+                        history[q, part, lane] = histories[source[p], part, old]
+                q += 1
+            for empty in range(q, end):
+                other[empty, lane] = begin + k
+        row = end
 
 
 def new_near_pairs(
-    dim: Any, bound: Ints, grains: Grains, pairs: Pairs, contacts: Contacts, gap_m: float
+    dim: Any,
+    width: int,
+    bound: Ints,
+    grains: Grains,
+    pairs: Pairs,
+    contacts: Contacts,
+    gap_m: float,
 ) -> NearPairs:
     """Choose near pairs among the listed ones, with history from contacts.
 
     Parameters
     ----------
     dim : tuple of d floats
+    width : int
+        How many lanes there are.
     bound : (c + 1,) int64
         First grains of the chunks.
     grains : Grains
@@ -253,28 +370,39 @@ def new_near_pairs(
     gap_m : float
         Not negative.
     """
-    counts, crossing, stop, chosen = _choose(dim, bound, grains, pairs, gap_m)
-    first = _room(counts, np.diff(pairs.start[bound]))
-    first_slot = _room(crossing, np.diff(first))
-    room, slots, spins = first[-1], first_slot[-1], grains.spin.shape[1]
+    counts = np.diff(bound)
+    first_slice = np.concatenate([[0], (-(-counts // width)).cumsum()])
+    grain = np.concatenate(
+        [
+            np.minimum(np.arange(begin, begin + slices * width), end - 1)
+            for begin, end, slices in zip(bound, bound[1:], np.diff(first_slice), strict=False)
+        ]
+    ).reshape(-1, width)
     near = NearPairs(
-        first,
-        stop,
-        np.empty(room, dtype=np.uint32),
-        np.zeros(room, dtype=np.uint8),
-        np.zeros((room, spins)),
-        np.zeros((room, spins)),
-        first_slot,
-        np.zeros((len(counts), farthest_chunk(bound, pairs) + 1), dtype=np.int64),
-        np.empty(slots, dtype=np.uint32),
-        np.empty(slots, dtype=np.uint32),
-        np.empty((slots, len(dim))),
-        np.empty((slots, spins)),
+        first_slice,
+        grain.astype(np.uint32),
+        np.zeros(len(grain), dtype=np.int64),
+        np.zeros(len(grain), dtype=np.int64),
+        np.zeros(len(bound), dtype=np.int64),
+        np.zeros((0, width), dtype=np.uint32),
+        np.zeros(0, dtype=np.uint8),
+        np.zeros((0, 2 * grains.spin.shape[1], width)),
         np.full(1, 0.5 * gap_m),
-        np.full(1, -1.0),
+        np.full(1, gap_m),
         np.zeros(1, dtype=np.int64),
     )
-    _lay_out(dim, bound, chosen, near)
+    needed = _rows_needed(dim, bound, grains, pairs, near)
+    first = np.concatenate([[0], (needed + needed // 32 + 16).cumsum()])
+    near.first_row[:] = near.last_row[:] = np.repeat(first[:-1], np.diff(first_slice))
+    near = near._replace(
+        first=first,
+        other=np.empty((first[-1], width), dtype=np.uint32),
+        held=np.zeros(first[-1], dtype=np.uint8),
+        history=np.empty((first[-1], *near.history.shape[1:])),
+    )
+    for c in range(len(counts)):
+        look(dim, c, bound, grains, pairs, near)
+    near.gap[0] = -1.0
     _carry(dim, contacts, bound, near)
     return near
 
@@ -302,90 +430,3 @@ def watch(near: NearPairs, way: float, skin: float) -> None:
     if near.left[0] < 0.0:
         near.gap[0] = near_gap(skin, way)
         near.left[0] = 0.5 * near.gap[0]
-
-
-@njit(**OPTIONS)
-def look(
-    dim: Any,
-    c: int,
-    bound: Ints,
-    grains: Grains,
-    pairs: Pairs,
-    near: NearPairs,
-) -> None:
-    """Choose the near pairs of a chunk anew among the listed ones, and keep their history.
-
-    Where the chunk has too little room, its contacts alone are left and ``near.full`` is set.
-
-    Parameters
-    ----------
-    dim : tuple of d floats
-    c : int
-        The chunk.
-    bound : (c + 1,) int64
-        First grains of the chunks.
-    grains : Grains
-    pairs : Pairs
-    near : NearPairs
-        Of this chunk written to.
-    """
-    # Names of their own: taking an array out of a tuple inside the loop counts references.
-    near_other, touching, stop = near.other, near.touching, near.stop
-    near_friction, near_rolling = near.friction, near.rolling
-    start, listed = pairs.start, pairs.other
-    position, kind, radius, gap = grains.position, grains.kind, grains.radius_of, near.gap[0]
-    begin, end = bound[c], bound[c + 1]
-    first, room = near.first[c], near.first[c + 1]
-    last = stop[end - 1] if end > begin else first
-    touched = 0
-    for k in range(first, last):
-        touched += touching[k]
-    owner, other = np.empty(touched, dtype=np.int64), np.empty(touched, dtype=np.int64)
-    friction = np.empty((touched, len(no_spin(dim))))
-    rolling = np.empty((touched, len(no_spin(dim))))
-    k, q = first, 0
-    for i in range(begin, end):
-        while k < stop[i]:
-            if touching[k]:
-                owner[q], other[q] = i, near_other[k]
-                store(load_spin(dim, near_friction, k), friction, q)
-                store(load_spin(dim, near_rolling, k), rolling, q)
-                q += 1
-            k += 1
-    crossing, slots = 0, near.first_slot[c + 1] - near.first_slot[c]
-    # Both lists are in the order of the listed pairs, so history is merged in as they pass.
-    k, q, full = first, 0, False
-    for i in range(begin, end):
-        x, reach = load(dim, position, i), radius[kind[i]] + gap
-        for p in range(index(start[i]), index(start[i + 1])):
-            j = listed[p]
-            apart = plus(load(dim, position, j), -1.0, x)
-            far = reach + radius[kind[j]]
-            held = q < touched and owner[q] == i and other[q] == j
-            if dot(apart, apart) < far * far:
-                crossing += j >= end
-                full = k == room or crossing > slots
-                if full:
-                    break
-                near_other[k] = j
-                touching[k] = held
-                store(load_spin(dim, friction, q) if held else no_spin(dim), near_friction, k)
-                store(load_spin(dim, rolling, q) if held else no_spin(dim), near_rolling, k)
-                k += 1
-            if held:
-                q += 1
-        if full:
-            break
-        stop[i] = k
-    if full:
-        near.full[0] = 1
-        q = 0
-        for i in range(begin, end):
-            while q < touched and owner[q] == i:
-                near_other[first + q], touching[first + q] = other[q], 1
-                store(load_spin(dim, friction, q), near_friction, first + q)
-                store(load_spin(dim, rolling, q), near_rolling, first + q)
-                q += 1
-            stop[i] = first + q
-    elif end > begin:
-        _give_slots(dim, c, bound, near)

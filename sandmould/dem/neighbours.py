@@ -21,12 +21,12 @@ _ROUNDED = 1.0 + 1e-9
 
 
 class Pairs(NamedTuple):
-    """Pairs of grains nearer than the skin; the first of a pair is the one stored earlier."""
+    """Pairs of grains nearer than the skin, each with both of its grains."""
 
     start: Places
     """(n + 1,) uint32: pairs of grain i are start[i] to start[i + 1]."""
     other: Places
-    """(p,) uint32: the second grain."""
+    """(p,) uint32: the other grain; those stored earlier come first."""
 
     @classmethod
     def none(cls) -> Pairs:
@@ -128,7 +128,7 @@ def _to_sides(
 def find_pairs(
     dim: Any, grains: Grains, skin: float, start: Ints, grid: Grid
 ) -> tuple[Places, Places]:
-    """List the pairs of grains whose surfaces are nearer than the skin.
+    """List the pairs of grains whose surfaces are nearer than the skin, with the earlier grain.
 
     Parameters
     ----------
@@ -194,7 +194,28 @@ def find_pairs(
     return first, other[:p].copy()
 
 
+@njit(**OPTIONS)
+def _of_both(first: Places, second: Places) -> tuple[Places, Places]:
+    """List pairs with both of their grains."""
+    n = len(first) - 1
+    start = np.zeros(n + 1, dtype=np.uint32)
+    for i in range(n):
+        start[i + 1] += first[i + 1] - first[i]
+        for p in range(first[i], first[i + 1]):
+            start[second[p] + 1] += 1
+    for i in range(n):
+        start[i + 1] += start[i]
+    filled, other = start[:-1].copy(), np.empty(2 * len(second), dtype=np.uint32)
+    for i in range(n):
+        for p in range(first[i], first[i + 1]):
+            j = second[p]
+            other[filled[i]], other[filled[j]] = j, i
+            filled[i] += 1
+            filled[j] += 1
+    return start, other
+
+
 def list_pairs(grains: Grains, start: Ints, grid: Grid, skin: float) -> Pairs:
     """List near pairs of sorted grains."""
     dim = dim_of(grains.position.shape[1])
-    return Pairs(*find_pairs(dim, grains, skin, start, grid))
+    return Pairs(*_of_both(*find_pairs(dim, grains, skin, start, grid)))

@@ -1,4 +1,4 @@
-"""Forces between grains, chunk by chunk."""
+"""One step of the grains of a chunk: forces between grains, in lanes, and the way they take."""
 
 from __future__ import annotations
 
@@ -6,126 +6,139 @@ import math
 from typing import Any
 
 from sandmould.compiled import njit
-from sandmould.dem.contact_law import Law, contact
-from sandmould.dem.grains import Floats, Grains, Ints
-from sandmould.dem.kinds import pair_coefficients_of
-from sandmould.dem.near_pairs import NearPairs
-from sandmould.dem.vectors import (
-    OPTIONS,
-    add_to,
-    dot,
-    index,
-    load,
-    load_spin,
-    no_spin,
-    no_vector,
-    plus,
-    store,
-    times,
+from sandmould.dem.contact_law import Law, PairCoefficients, contact
+from sandmould.dem.grains import Floats, Grains
+from sandmould.dem.lanes import (
+    any_of,
+    beside,
+    but,
+    columns_at,
+    every,
+    fused,
+    kinds_at,
+    largest_of,
+    places_at,
+    put_columns,
+    put_rows,
+    rows_at,
 )
+from sandmould.dem.motion import Damping, kicked
+from sandmould.dem.near_pairs import NearPairs
+from sandmould.dem.vectors import OPTIONS, dot, index, kept_where, no_spin, plus, times
+
+_NUMBER, _SIZES = (0.0,), (0.0, 0.0, 0.0)
+"""As long as the rows that are read."""
 
 
 @njit(**OPTIONS)
-def pair_forces(
+def pass_pairs(
     dim: Any,
+    lanes: Any,
     c: int,
-    bound: Ints,
     grains: Grains,
+    ahead: Floats,
     coefficients: Floats,
     near: NearPairs,
     law: Law,
+    damping: Damping,
+    body: Any,
     dt: float,
-) -> None:
-    """Add the forces of one chunk's pairs; its grains' forces must be zero before.
+    moves: bool,
+) -> float:
+    """Add the forces between grains to those of a chunk, or let its grains move on at once.
+
+    Grains that move on read nothing that others write: what they become goes to arrays of its own.
 
     Parameters
     ----------
     dim : tuple
         ``PLANE`` or ``SPACE``.
+    lanes : tuple
+        As long as the slices are wide.
     c : int
         The chunk.
-    bound : (c + 1,) int64
-        First grains of the chunks.
     grains : Grains
+        Forces and moments are those of the surfaces. Grains that move on have their next velocity
+        and spin in their place.
+    ahead : (n, d) float64, m
+        The next positions of grains that move on.
     coefficients : (k, k, 3) float64
         Of two kinds, for this law: see ``pair_up``.
     near : NearPairs
     law : Law
+    damping : Damping
+    body : tuple of d floats, m/s2
+        See ``kick``.
     dt : float, s
+    moves : bool
+        Whether the grains move on.
+
+    Returns
+    -------
+    float, m2/s2
+        Largest squared speed of grains that move on; not a number as soon as one speed is none.
     """
     # Names of their own: taking an array out of a tuple inside the loop counts references.
     position, velocity, spin = grains.position, grains.velocity, grains.spin
     kind, radius, force, moment = grains.kind, grains.radius_of, grains.force, grains.moment
-    stop, other, touching, slots = near.stop, near.other, near.touching, near.slot
-    friction, rolling = near.friction, near.rolling
-    slot_force, slot_moment = near.slot_force, near.slot_moment
-    begin, end = bound[c], index(bound[c + 1])
-    crossing = near.first_slot[c]
-    first = near.first[c]
-    for i in range(begin, bound[c + 1]):
-        x, v, w = load(dim, position, i), load(dim, velocity, i), load_spin(dim, spin, i)
-        kind_i = index(kind[i])
-        r = radius[kind_i]
-        force_i, moment_i = no_vector(dim), no_spin(dim)
-        for k in range(index(first), index(stop[i])):
-            j = index(other[k])
-            kind_j = index(kind[j])
-            r_j = radius[kind_j]
-            apart = plus(load(dim, position, j), -1.0, x)
-            distance2 = dot(apart, apart)
-            reach = r + r_j
-            if distance2 < reach * reach:
+    mass, inertia = grains.mass_of, grains.inertia_of
+    grain, other, held, history = near.grain, near.other, near.held, near.history
+    first_row, last_row, kinds = near.first_row, near.last_row, len(radius)
+    width, like_spin = len(lanes), no_spin(dim)
+    part = len(like_spin) * width
+    fastest2 = sound = every(lanes, 0.0)
+    for s in range(near.first_slice[c], near.first_slice[c + 1]):
+        mine = places_at(lanes, grain, s * width)
+        x, v = rows_at(dim, position, mine), rows_at(dim, velocity, mine)
+        w = rows_at(like_spin, spin, mine)
+        force_i, moment_i = rows_at(dim, force, mine), rows_at(like_spin, moment, mine)
+        kind_i = kinds_at(kind, mine)
+        (r,) = rows_at(_NUMBER, radius, kind_i)
+        for row in range(index(first_row[s]), index(last_row[s])):
+            theirs = places_at(lanes, other, row * index(width))
+            apart = plus(rows_at(dim, position, theirs), -1.0, x)
+            kind_j = kinds_at(kind, theirs)
+            (r_j,) = rows_at(_NUMBER, radius, kind_j)
+            distance2, reach = dot(apart, apart), r + r_j
+            touch = but(distance2 < reach * reach, mine, theirs)
+            at = row * index(2 * part)
+            if any_of(touch):
                 distance = math.sqrt(distance2)
                 overlap, closeness = reach - distance, 1.0 / distance
-                press, turn_i, turn_j, slide, roll, _ = contact(
+                sizes = rows_at(_SIZES, coefficients, beside(kind_i, kinds, kind_j))
+                press, turn, _, slide, roll, _ = contact(
                     times(apart, closeness),
                     overlap,
-                    plus(load(dim, velocity, j), -1.0, v),
+                    plus(rows_at(dim, velocity, theirs), -1.0, v),
                     w,
-                    load_spin(dim, spin, j),
-                    r - 0.5 * overlap,
-                    r_j - 0.5 * overlap,
+                    rows_at(like_spin, spin, theirs),
+                    fused(-0.5, overlap, r),
+                    fused(-0.5, overlap, r_j),
                     law.lead_s * closeness,
-                    pair_coefficients_of(coefficients, kind_i, kind_j),
+                    PairCoefficients(sizes[0], sizes[1], sizes[2]),
                     law,
                     dt,
-                    load_spin(dim, friction, k),
-                    load_spin(dim, rolling, k),
+                    columns_at(w, history, at),
+                    columns_at(w, history, at + index(part)),
                 )
-                touching[k] = 1
-                store(slide, friction, k)
-                store(roll, rolling, k)
-                force_i = plus(force_i, 1.0, press)
-                moment_i = plus(moment_i, 1.0, turn_i)
-                if j < end:
-                    add_to(press, -1.0, force, j)
-                    add_to(turn_j, 1.0, moment, j)
-                else:
-                    store(times(press, -1.0), slot_force, slots[crossing])
-                    store(turn_j, slot_moment, slots[crossing])
-            elif touching[k]:
-                touching[k] = 0
-                store(no_spin(dim), friction, k)
-                store(no_spin(dim), rolling, k)
-                if j >= end:
-                    store(no_vector(dim), slot_force, slots[crossing])
-                    store(no_spin(dim), slot_moment, slots[crossing])
-            if j >= end:
-                crossing += 1
-        first = stop[i]
-        add_to(force_i, 1.0, force, i)
-        add_to(moment_i, 1.0, moment, i)
-
-
-@njit(**OPTIONS)
-def gather_incoming(dim: Any, c: int, near: NearPairs, grains: Grains) -> None:
-    """Add what earlier chunks put on the grains of one chunk, the earliest first."""
-    slot_bound, grain, force, moment = (
-        near.slot_bound, near.slot_grain, grains.force, grains.moment
-    )  # fmt: skip
-    slot_force, slot_moment = near.slot_force, near.slot_moment
-    for earlier in range(min(c, slot_bound.shape[1] - 1), 0, -1):
-        begin, end = slot_bound[c - earlier, earlier - 1], slot_bound[c - earlier, earlier]
-        for slot in range(begin, end):
-            add_to(load(dim, slot_force, slot), 1.0, force, grain[slot])
-            add_to(load_spin(dim, slot_moment, slot), 1.0, moment, grain[slot])
+                held[row] = 1
+                put_columns(kept_where(slide, touch), history, at)
+                put_columns(kept_where(roll, touch), history, at + index(part))
+                force_i = plus(force_i, 1.0, kept_where(press, touch))
+                moment_i = plus(moment_i, 1.0, kept_where(turn, touch))
+            elif held[row]:
+                held[row] = 0
+                put_columns(kept_where(w, touch), history, at)
+                put_columns(kept_where(w, touch), history, at + index(part))
+        if moves:
+            (m,), (inert,) = rows_at(_NUMBER, mass, kind_i), rows_at(_NUMBER, inertia, kind_i)
+            v, w = kicked(v, w, force_i, moment_i, m, inert, dt, body, damping)
+            put_rows(v, force, mine)
+            put_rows(w, moment, mine)
+            put_rows(plus(x, dt, v), ahead, mine)
+            speed2 = dot(v, v)
+            fastest2, sound = max(fastest2, speed2), sound + speed2
+        else:
+            put_rows(force_i, force, mine)
+            put_rows(moment_i, moment, mine)
+    return largest_of(fastest2) if largest_of(sound) < math.inf else math.nan

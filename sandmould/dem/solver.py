@@ -15,6 +15,7 @@ from sandmould.dem.chunks import chunk_bounds
 from sandmould.dem.facet_grid import FacetGrids
 from sandmould.dem.grains import Floats, Grains
 from sandmould.dem.kinds import pair_up
+from sandmould.dem.lanes import lanes_of_processor
 from sandmould.dem.motion import kick
 from sandmould.dem.moving_state import from_arrays, to_arrays
 from sandmould.dem.near_pairs import (
@@ -33,6 +34,7 @@ from sandmould.dem.steps import (
     Moving,
     Team,
     advance,
+    exchanged,
     find_forces,
     new_walls,
     shares,
@@ -61,6 +63,7 @@ class Solver:
         skin_m: float,
         threads: int = 1,
         orientations: bool = False,
+        lanes: tuple[float, ...] | None = None,
     ) -> None:
         """Set up a scene without grains.
 
@@ -74,6 +77,9 @@ class Solver:
             No more are started than there are cores; results do not depend on it.
         orientations : bool
             Whether ``orientation`` is kept: angles (n, 1) in 2D, matrices (n, 9) in 3D.
+        lanes : tuple of floats, optional
+            As many zeros as grains are computed at once, a power of two: those of the processor
+            where none are given. Results do not depend on it.
         """
         self.scene = scene
         self.surfaces = surfaces
@@ -83,6 +89,7 @@ class Solver:
         self.lists = 0
         """How often pairs were listed."""
         self._dim = dim_of(self.dimension)
+        self._lanes = lanes or lanes_of_processor()
         self._skin = skin_m
         self._threads = min(threads, len(os.sched_getaffinity(0)))
         self._pool = ThreadPoolExecutor(max(1, self._threads - 1))
@@ -99,11 +106,25 @@ class Solver:
         candidates = Candidates(none, np.zeros(1, dtype=np.uint32), none.copy())
         bound = chunk_bounds(0)
         history = new_history(self._dim, 0)
-        near = new_near_pairs(self._dim, bound, grains, pairs, Contacts.none(d), 0.0)
+        near = new_near_pairs(
+            self._dim, len(self._lanes), bound, grains, pairs, Contacts.none(d), 0.0
+        )
         walls = new_walls(self.surfaces.arrays, bound, candidates, history)
         coefficients = pair_up(grains, self.scene.grain_law)
         upright, listed = self._upright(0), np.zeros((0, d))
-        return Moving(grains, coefficients, pairs, near, bound, walls, upright, listed, np.zeros(1))
+        return Moving(
+            grains,
+            listed.copy(),
+            coefficients,
+            pairs,
+            near,
+            self._lanes,
+            bound,
+            walls,
+            upright,
+            listed,
+            np.zeros(1),
+        )
 
     def _upright(self, n: int) -> Floats:
         """Orientations of grains not turned yet."""
@@ -120,7 +141,7 @@ class Solver:
     def contacts(self) -> Contacts:
         """Touching pairs of grains and their history, a copy."""
         moving = self.moving
-        return contacts_of(self._dim, moving.bound, moving.near)
+        return contacts_of(self._dim, moving.bound, moving.grains, moving.near)
 
     @property
     def orientation(self) -> Floats:
@@ -208,6 +229,7 @@ class Solver:
         # What is made anew is let go first: it is most of the memory.
         self.moving = old = old._replace(
             grains=grains,
+            ahead=nothing.ahead,
             pairs=nothing.pairs,
             near=nothing.near,
             orientation=orientation,
@@ -217,7 +239,7 @@ class Solver:
         bound = chunk_bounds(n)
         speed2 = float(np.einsum("ij,ij->i", grains.velocity, grains.velocity).max())
         gap_m = near_gap(self._skin, self.scene.dt * math.sqrt(speed2))
-        near = new_near_pairs(self._dim, bound, grains, pairs, contacts, gap_m)
+        near = new_near_pairs(self._dim, len(self._lanes), bound, grains, pairs, contacts, gap_m)
         arrays = self.surfaces.arrays
         reach_m = self._skin + float(grains.radius_of.max())
         candidates = candidates_in(
@@ -240,9 +262,11 @@ class Solver:
         walls.loads[0] = old.walls.loads.sum(axis=0)
         self.moving = Moving(
             grains,
+            np.empty_like(grains.position),
             pair_up(grains, self.scene.grain_law),
             pairs,
             near,
+            self._lanes,
             bound,
             walls,
             orientation,
@@ -255,7 +279,13 @@ class Solver:
         """Choose the near pairs anew, with room for all of them."""
         moving, gap_m = self.moving, float(self.moving.near.gap[0])
         near = new_near_pairs(
-            self._dim, moving.bound, moving.grains, moving.pairs, self.contacts, gap_m
+            self._dim,
+            len(self._lanes),
+            moving.bound,
+            moving.grains,
+            moving.pairs,
+            self.contacts,
+            gap_m,
         )
         self.moving = moving._replace(near=near)
 
@@ -303,7 +333,11 @@ class Solver:
             )
             return ended
 
-        return self._together(run_thread)
+        done, state = self._together(run_thread)
+        if min(done, steps - 1) % 2:
+            grains, ahead = exchanged(self.grains, self.moving.ahead)
+            self.moving = self.moving._replace(grains=grains, ahead=ahead)
+        return done, state
 
     def _together(self, run_thread: Callable[[int, int, Team], tuple[int, int]]) -> tuple[int, int]:
         """Call a step loop in all threads: with the thread's number, how many, and what they share.
@@ -363,6 +397,6 @@ class Solver:
 
     def restore(self, arrays: dict[str, np.ndarray]) -> None:
         """Go on from what ``state`` gave, with no loads collected yet."""
-        self.moving = from_arrays(arrays, self.scene.grain_law)
+        self.moving = from_arrays(arrays, self.scene.grain_law, self._lanes)
         self.surfaces.arrays = self.moving.walls.arrays
         self.steps = int(arrays["steps"])

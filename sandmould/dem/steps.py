@@ -15,10 +15,20 @@ from sandmould.dem.grains import Floats, Grains, Ints
 from sandmould.dem.motion import Damping, drift, kick, turn
 from sandmould.dem.near_pairs import NearPairs, look, watch
 from sandmould.dem.neighbours import Pairs
-from sandmould.dem.pairs import gather_incoming, pair_forces
+from sandmould.dem.pairs import pass_pairs
 from sandmould.dem.surface_contacts import surface_forces
 from sandmould.dem.surfaces import SurfaceArrays, farthest_moved, move_vertices
-from sandmould.dem.vectors import INLINED, OPTIONS, dot, load, no_vector, plus, times
+from sandmould.dem.vectors import (
+    INLINED,
+    OPTIONS,
+    dot,
+    load,
+    no_spin,
+    no_vector,
+    plus,
+    store,
+    times,
+)
 from sandmould.dem.wall_history import WallHistory
 
 DONE, LIST_IS_OLD, NOT_A_NUMBER, NO_ROOM = 0, 1, 2, 3
@@ -76,10 +86,14 @@ class Moving(NamedTuple):
     """What the loop moves."""
 
     grains: Grains
+    ahead: Floats
+    """(n, d) float64, m: room for the next positions; see ``exchanged``."""
     coefficients: Floats
     """See ``pair_up``."""
     pairs: Pairs
     near: NearPairs
+    lanes: tuple[float, ...]
+    """As many zeros as a slice of near pairs has lanes, which compiled code tells from them."""
     bound: Ints
     """(c + 1,) int64: first grains of the chunks."""
     walls: Walls
@@ -112,8 +126,9 @@ def shares(bound: Ints, near: NearPairs, threads: int) -> Ints:
     chunks = len(bound) - 1
     if threads == 1:
         return np.array([0, chunks])
-    # A near pair costs about twice what a grain costs beside its pairs.
-    work = 2 * (near.stop[bound[1:] - 1].astype(np.int64) - near.first[:-1]) + np.diff(bound)
+    # A near pair costs about as much as a grain beside its pairs.
+    rows = np.concatenate([[0], (near.last_row - near.first_row).cumsum()])[near.first_slice]
+    work = np.diff(rows) * near.grain.shape[1] + np.diff(bound)
     ends = np.concatenate([[0], work.cumsum()])
     equal = ends[-1] * np.arange(1, threads) / threads
     nearest = np.abs(ends[:, None] - equal).argmin(axis=0)
@@ -135,12 +150,48 @@ def _farthest(dim: Any, grains: Grains, listed: Floats, shift: Any) -> float:
 
 
 @njit(**OPTIONS)
-def _add_forces(
-    dim: Any, c: int, scene: DemScene, moving: Moving, shift: Any, speed: Any, dt: float
-) -> None:
-    """Add all forces on the grains of a chunk but those of earlier chunks."""
-    grains, walls = moving.grains, moving.walls
-    pair_forces(dim, c, moving.bound, grains, moving.coefficients, moving.near, scene.grain_law, dt)
+def exchanged(grains: Grains, ahead: Floats) -> tuple[Grains, Floats]:
+    """Grains that have moved on, and room for their next positions.
+
+    Their velocities and spins stand where forces and moments stood, and the other way round.
+    """
+    return Grains(
+        grains.id,
+        ahead,
+        grains.force,
+        grains.moment,
+        grains.kind,
+        grains.radius_of,
+        grains.mass_of,
+        grains.inertia_of,
+        grains.velocity,
+        grains.spin,
+    ), grains.position
+
+
+@njit(**OPTIONS)
+def step_chunk(
+    dim: Any,
+    c: int,
+    scene: DemScene,
+    moving: Moving,
+    grains: Grains,
+    ahead: Floats,
+    shift: Any,
+    speed: Any,
+    body: Any,
+    dt: float,
+    moves: bool,
+) -> float:
+    """Find all forces on the grains of a chunk, and let them move on where another step follows.
+
+    Gives their largest squared speed, m2/s2.
+    """
+    walls, first, last = moving.walls, moving.bound[c], moving.bound[c + 1]
+    force, moment = grains.force, grains.moment
+    for i in range(first, last):
+        store(no_vector(dim), force, i)
+        store(no_spin(dim), moment, i)
     surface_forces(
         dim,
         walls.first_row[c],
@@ -165,6 +216,23 @@ def _add_forces(
         walls.travel[0],
         walls.due,
     )
+    fastest2 = pass_pairs(
+        dim,
+        moving.lanes,
+        c,
+        grains,
+        ahead,
+        moving.coefficients,
+        moving.near,
+        scene.grain_law,
+        scene.damping,
+        body,
+        dt,
+        moves,
+    )
+    if moves and len(moving.orientation):
+        turn(dim, first, last, grains.moment, moving.orientation, dt)
+    return fastest2
 
 
 @njit(**OPTIONS)
@@ -176,12 +244,10 @@ def find_forces(dim: Any, scene: DemScene, moving: Moving) -> None:
     dim : tuple
     scene : DemScene
     moving : Moving
-        Its grains' forces are zero before.
     """
+    none = no_vector(dim)
     for c in range(len(moving.bound) - 1):
-        _add_forces(dim, c, scene, moving, no_vector(dim), no_vector(dim), 0.0)
-    for c in range(len(moving.bound) - 1):
-        gather_incoming(dim, c, moving.near, moving.grains)
+        step_chunk(dim, c, scene, moving, moving.grains, moving.ahead, none, none, none, 0.0, False)
 
 
 @njit(**INLINED)
@@ -193,29 +259,25 @@ def _box(dim: Any, scene: DemScene, displacement: Floats, k: int) -> Any:
     return times(scene.direction, displacement[k + 1]), times(scene.direction, way / scene.dt)
 
 
+@njit(**INLINED)
+def _body(dim: Any, scene: DemScene, displacement: Floats, k: int) -> Any:
+    """Gravity and, in the frame of the box, minus its acceleration in step k, m/s2."""
+    if not scene.box_frame:
+        return scene.gravity
+    # The second difference of the walls' own motion: the trajectories of moving walls.
+    ahead = displacement[k + 2] - displacement[k + 1]
+    behind = displacement[k + 1] - displacement[k]
+    return plus(scene.gravity, -(ahead - behind) / (scene.dt * scene.dt), scene.direction)
+
+
 @njit(**OPTIONS)
-def _move(dim: Any, c: int, scene: DemScene, moving: Moving, displacement: Floats, k: int) -> float:
-    """Advance the grains of a chunk by step k; gives their largest squared speed, m2/s2."""
+def _move(dim: Any, c: int, scene: DemScene, moving: Moving, body: Any) -> float:
+    """Let the grains of a chunk move on where they are; gives their largest squared speed."""
     first, last = moving.bound[c], moving.bound[c + 1]
-    body = scene.gravity
-    if scene.box_frame:
-        # The second difference of the walls' own motion: the trajectories of moving walls.
-        ahead = displacement[k + 2] - displacement[k + 1]
-        behind = displacement[k + 1] - displacement[k]
-        body = plus(body, -(ahead - behind) / (scene.dt * scene.dt), scene.direction)
     kick(dim, first, last, moving.grains, body, scene.damping, scene.dt)
     if len(moving.orientation):
-        turn(dim, first, last, moving.grains, moving.orientation, scene.dt)
+        turn(dim, first, last, moving.grains.spin, moving.orientation, scene.dt)
     return drift(dim, first, last, moving.grains, scene.dt)
-
-
-@njit(**OPTIONS)
-def _finish(
-    dim: Any, c: int, scene: DemScene, moving: Moving, displacement: Floats, k: int, goes_on: bool
-) -> float:
-    """Add what earlier chunks put on a chunk, and move it on where another step follows."""
-    gather_incoming(dim, c, moving.near, moving.grains)
-    return _move(dim, c, scene, moving, displacement, k) if goes_on else 0.0
 
 
 @njit(**OPTIONS)
@@ -223,6 +285,7 @@ def _state(
     dim: Any,
     scene: DemScene,
     moving: Moving,
+    grains: Grains,
     surfaces_move: bool,
     fastest2: float,
     box: Any,
@@ -240,7 +303,7 @@ def _state(
     moving.reach[0] -= bound
     walls.travel[0] += bound
     if moving.reach[0] < 0.0:
-        moving.reach[0] = half_skin - _farthest(dim, moving.grains, moving.listed, shift)
+        moving.reach[0] = half_skin - _farthest(dim, grains, moving.listed, shift)
         if moving.reach[0] < 0.1 * half_skin:
             state = LIST_IS_OLD
     if surfaces_move:
@@ -264,6 +327,9 @@ def advance(
     team: Team,
 ) -> tuple[int, int]:
     """Compute steps until they are done, lists must be made anew, or numbers go wrong.
+
+    Where the lesser of ``done`` and ``steps - 1`` is odd, grains were exchanged in the end: see
+    ``exchanged``.
 
     Parameters
     ----------
@@ -289,43 +355,39 @@ def advance(
         ``DONE``, ``NOT_A_NUMBER``, or, the next step having drifted, ``LIST_IS_OLD`` where pairs
         must be listed again and ``NO_ROOM`` where the near ones need more room.
     """
-    near, bound = moving.near, moving.bound
+    near, bound, grains, ahead = moving.near, moving.bound, moving.grains, moving.ahead
     mine = range(team.share[thread], team.share[thread + 1])
-    # Chunks of threads before add to the first ones alone.
-    later = near.slot_bound.shape[1] - 1 if thread else 0
-    shared = range(mine.start, min(mine.start + later, mine.stop))
     barrier, speeds2, state = team.barrier, team.speeds2, team.state
     # Where no vertex moves, none begins to within a call.
     steps_left = moving.walls.arrays.steps_left
     move = len(steps_left) > 0
     for k in range(1 if drifted else 0, steps + 1):
         if k == 0:
+            body = _body(dim, scene, displacement, 0)
             for c in mine:
-                speeds2[c] = _move(dim, c, scene, moving, displacement, 0)
+                speeds2[c] = _move(dim, c, scene, moving, body)
         else:
             shift, speed = _box(dim, scene, displacement, k)
+            moves = k < steps
+            body = _body(dim, scene, displacement, k) if moves else scene.gravity
             for c in mine:
-                _add_forces(dim, c, scene, moving, shift, speed, scene.dt)
-                if c >= shared.stop:
-                    # The chunk moves on while it is still in the cache: later chunks neither
-                    # read it nor add to it.
-                    speeds2[c] = _finish(dim, c, scene, moving, displacement, k, k < steps)
-            wait_for_all(barrier, threads)
-            for c in shared:
-                speeds2[c] = _finish(dim, c, scene, moving, displacement, k, k < steps)
-        if k == steps:
-            break
+                speeds2[c] = step_chunk(
+                    dim, c, scene, moving, grains, ahead, shift, speed, body, scene.dt, moves
+                )
+            if not moves:
+                break
+            grains, ahead = exchanged(grains, ahead)
         wait_for_all(barrier, threads)
         if thread == 0:
             box = _box(dim, scene, displacement, k + 1)
             move = move and steps_left.max() >= 0
-            state[0] = _state(dim, scene, moving, move, speeds2.max(), box, half_skin)
+            state[0] = _state(dim, scene, moving, grains, move, speeds2.max(), box, half_skin)
         wait_for_all(barrier, threads)
         if state[0] != DONE:
             return k, state[0]
         if near.gap[0] >= 0.0:
             for c in mine:
-                look(dim, c, bound, moving.grains, moving.pairs, near)
+                look(dim, c, bound, grains, moving.pairs, near)
             wait_for_all(barrier, threads)
             if near.full[0]:
                 return k, NO_ROOM

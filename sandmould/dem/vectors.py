@@ -15,12 +15,11 @@ from typing import Any
 import numpy as np
 from numba.extending import overload, register_jitable
 
-OPTIONS: dict[str, Any] = {
-    "nogil": True,
-    "fastmath": {"contract", "nsz"},
-    "error_model": "numpy",
-}
-"""How every kernel is compiled: fused multiply-add allowed, no other change of the arithmetic."""
+from sandmould.dem.lanes import fused, where
+
+OPTIONS: dict[str, Any] = {"nogil": True, "error_model": "numpy"}
+"""How every kernel is compiled: each operation rounds by itself but for ``fused``, so that digits
+depend neither on the processor nor on how many lanes it has."""
 INLINED = OPTIONS | {"forceinline": True}
 """For functions called for every contact: their many arguments stay in registers."""
 index = np.uint64
@@ -55,15 +54,15 @@ dot = _by_length(
     "dot",
     "Scalar product.",
     one=lambda a, b: a[0] * b[0],
-    two=lambda a, b: a[0] * b[0] + a[1] * b[1],
-    three=lambda a, b: a[0] * b[0] + a[1] * b[1] + a[2] * b[2],
+    two=lambda a, b: fused(a[1], b[1], a[0] * b[0]),
+    three=lambda a, b: fused(a[2], b[2], fused(a[1], b[1], a[0] * b[0])),
 )
 plus = _by_length(
     "plus",
     "a + s b, called as plus(a, s, b).",
-    one=lambda a, s, b: (a[0] + s * b[0],),
-    two=lambda a, s, b: (a[0] + s * b[0], a[1] + s * b[1]),
-    three=lambda a, s, b: (a[0] + s * b[0], a[1] + s * b[1], a[2] + s * b[2]),
+    one=lambda a, s, b: (fused(s, b[0], a[0]),),
+    two=lambda a, s, b: (fused(s, b[0], a[0]), fused(s, b[1], a[1])),
+    three=lambda a, s, b: (fused(s, b[0], a[0]), fused(s, b[1], a[1]), fused(s, b[2], a[2])),
 )
 times = _by_length(
     "times",
@@ -71,6 +70,13 @@ times = _by_length(
     one=lambda a, s: (s * a[0],),
     two=lambda a, s: (s * a[0], s * a[1]),
     three=lambda a, s: (s * a[0], s * a[1], s * a[2]),
+)
+kept_where = _by_length(
+    "kept_where",
+    "v where a condition holds, zeros elsewhere: kept_where(v, condition).",
+    one=lambda v, c: (where(c, v[0], 0.0),),
+    two=lambda v, c: (where(c, v[0], 0.0), where(c, v[1], 0.0)),
+    three=lambda v, c: (where(c, v[0], 0.0), where(c, v[1], 0.0), where(c, v[2], 0.0)),
 )
 load = _by_length(
     "load",
@@ -156,15 +162,28 @@ in_space = _by_length(
     two=lambda n, t: (-n[1] * t[0], n[0] * t[0]),
     three=lambda n, t: t,
 )
+cross = _by_length(
+    "cross",
+    "Vector product in 3D, its only component in 2D: cross(a, b).",
+    two=lambda a, b: fused(a[0], b[1], -(a[1] * b[0])),
+    three=lambda a, b: (
+        fused(a[1], b[2], -(a[2] * b[1])),
+        fused(a[2], b[0], -(a[0] * b[2])),
+        fused(a[0], b[1], -(a[1] * b[0])),
+    ),
+)
+of_other = _by_length(
+    "of_other",
+    "A tangent as the other body has it, whose normal is opposite: of_other(dim, t).\n\n"
+    "In 2D the tangent t turns round with the normal.",
+    two=lambda dim, t: t,
+    three=lambda dim, t: times(t, -1.0),
+)
 spin_slip = _by_length(
     "spin_slip",
     "Tangent w x n, the velocity at the end of a unit arm along n: spin_slip(n, w).",
     two=lambda n, w: (w[0],),
-    three=lambda n, w: (
-        w[1] * n[2] - w[2] * n[1],
-        w[2] * n[0] - w[0] * n[2],
-        w[0] * n[1] - w[1] * n[0],
-    ),
+    three=lambda n, w: cross(w, n),
 )
 turned_spin = _by_length(
     "turned_spin",
@@ -177,20 +196,14 @@ tangent_moment = _by_length(
     "tangent_moment",
     "Moment n x t of a tangent force at the end of a unit arm along n: tangent_moment(n, t).",
     two=lambda n, t: (t[0],),
-    three=lambda n, t: (
-        n[1] * t[2] - n[2] * t[1],
-        n[2] * t[0] - n[0] * t[2],
-        n[0] * t[1] - n[1] * t[0],
-    ),
+    three=lambda n, t: cross(n, t),
 )
-
-
 tangent_after = _by_length(
     "tangent_after",
     "The tangent t of the last step in the plane of n, and s times that of v, eq. (22) with its\n"
     "missing factor n: tangent_after(n, t, s, v).\n\n"
     "The length of t falls by the square of the angle turned in a step, some 1e-9 of it.",
-    two=lambda n, t, s, v: (t[0] + s * (n[0] * v[1] - n[1] * v[0]),),
+    two=lambda n, t, s, v: (fused(s, cross(n, v), t[0]),),
     three=lambda n, t, s, v: without(n, plus(t, s, v)),
 )
 rolling_part = _by_length(
@@ -203,15 +216,15 @@ rolling_part = _by_length(
 
 
 @register_jitable
-def _one_component(action: float, rate: float, alpha: float) -> float:
-    return action - alpha * abs(action) * (math.copysign(1.0, rate) if rate != 0.0 else 0.0)
+def _one_component(action: Any, rate: Any, alpha: float) -> Any:
+    against = alpha * abs(action)
+    return action - where(rate > 0.0, against, where(rate < 0.0, -against, 0.0))
 
 
 @register_jitable
 def _limited_3(action: Any, limit: float) -> Any:
     # Without a branch: which contacts slip cannot be foretold, and a wrong guess costs more.
-    size2, limit2 = dot(action, action), limit * limit + 1e-300
-    return times(action, limit / math.sqrt(size2 if size2 > limit2 else limit2))
+    return times(action, limit / math.sqrt(max(dot(action, action), limit * limit + 1e-300)))
 
 
 limited = _by_length(

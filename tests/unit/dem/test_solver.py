@@ -9,7 +9,7 @@ from sandmould.dem import chunks as chunks_module
 from sandmould.dem.contact_law import Law
 from sandmould.dem.grains import Grains
 from sandmould.dem.motion import ISOTROPIC, NONE, Damping
-from sandmould.dem.near_pairs import new_near_pairs
+from sandmould.dem.near_pairs import lanes_of, new_near_pairs
 from sandmould.dem.neighbours import list_pairs, make_grid, sort_into_cells
 from sandmould.dem.solver import NotANumberError, Solver
 from sandmould.dem.steps import DemScene
@@ -73,7 +73,7 @@ def solver(dimension: int, n: int, threads: int = 1, **changes: object) -> Solve
 
 @pytest.mark.parametrize("dimension", [2, 3])
 @pytest.mark.parametrize("seed", range(3))
-def test_every_near_pair_is_listed_once(dimension: int, seed: int) -> None:
+def test_every_near_pair_is_listed_with_both_grains(dimension: int, seed: int) -> None:
     rng = np.random.default_rng(seed)
     grains, _ = cloud(dimension, 300)
     # crowded, and two far away as lost grains are
@@ -86,13 +86,12 @@ def test_every_near_pair_is_listed_once(dimension: int, seed: int) -> None:
     order, start = sort_into_cells(grains.position, grid)
     pairs = list_pairs(grains.ordered(order), start, grid, skin)
     first = np.repeat(np.arange(300), np.diff(pairs.start))
-    found = {
-        frozenset(p)
-        for p in zip(order[first].tolist(), order[pairs.other.astype(int)].tolist(), strict=True)
-    }
+    other = order[pairs.other.astype(int)]
+    found = set(zip(order[first].tolist(), other.tolist(), strict=True))
     apart = np.linalg.norm(grains.position[:, None] - grains.position[None], axis=2)
     near = apart < grains.radius[:, None] + grains.radius[None] + skin
-    expected = {frozenset((i, j)) for i, j in np.argwhere(np.triu(near, 1)).tolist()}
+    np.fill_diagonal(near, False)
+    expected = {(i, j) for i, j in np.argwhere(near).tolist()}
     assert len(found) == len(pairs.other)
     assert found == expected
 
@@ -154,6 +153,17 @@ def test_listing_again_changes_nothing(dimension: int) -> None:
     np.testing.assert_allclose(one.spin, two.spin, atol=1e-5)
 
 
+def near_of(made: Solver) -> int:
+    """Near pairs, each with both of its grains."""
+    near = made.moving.near
+    place = lanes_of(made.moving.bound, near)
+    width = near.grain.shape[1]
+    return sum(
+        int((near.other[near.first_row[s] : near.last_row[s], lane] != i).sum())
+        for i, (s, lane) in enumerate(zip(place // width, place % width, strict=True))
+    )
+
+
 @pytest.mark.parametrize("dimension", [2, 3])
 def test_looks_for_near_pairs_change_no_bit(
     dimension: int, monkeypatch: pytest.MonkeyPatch
@@ -165,14 +175,19 @@ def test_looks_for_near_pairs_change_no_bit(
         always.moving.near.left[:] = -1.0
         moving = never.moving
         whole = new_near_pairs(
-            never._dim, moving.bound, moving.grains, moving.pairs, never.contacts, 1.0
+            never._dim,
+            len(never._lanes),
+            moving.bound,
+            moving.grains,
+            moving.pairs,
+            never.contacts,
+            1.0,
         )
         whole.left[:] = np.inf
         never.moving = moving._replace(near=whole)
         for s in (seldom, always, never):
             s.advance(np.zeros(5))
-        near, listed = seldom.moving.near, seldom.moving.pairs.start
-        fewer += int(near.stop[-1] < listed[-1] == never.moving.near.stop[-1])
+        fewer += near_of(seldom) < near_of(never) == len(never.moving.pairs.other)
         np.testing.assert_array_equal(seldom.grains.position, never.grains.position)
     assert fewer > 500  # some pairs were passed over, and looked at in every step by the other
     assert len(never.contacts.first) > 3
@@ -201,9 +216,9 @@ def test_chunks_change_round_off_alone(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(chunks_module, "CHUNK", 40)
     parts = solver(3, 400)
     parts.advance(np.zeros(2002))  # not for long: round-off grows with every collision
-    near = parts.moving.near
-    used = zip(near.first_slot[:-1], near.slot_bound[:, -1], strict=True)
-    assert any(near.slot_force[a:b].any() for a, b in used)  # pairs touch across chunks
+    contacts, bound = parts.contacts, parts.moving.bound
+    chunk = [np.searchsorted(bound, c, side="right") for c in (contacts.first, contacts.second)]
+    assert (chunk[0] != chunk[1]).any()  # pairs touch across chunks
     one, two = (s.grains.ordered(np.argsort(s.grains.id)) for s in (whole, parts))
     np.testing.assert_allclose(one.position, two.position, atol=1e-11)
     np.testing.assert_allclose(one.force, two.force, atol=1e-6)
