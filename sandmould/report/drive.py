@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping, Sequence
-from dataclasses import replace
 
 import numpy as np
 import pandas as pd
@@ -19,7 +18,6 @@ from sandmould.scenario.drive import (
     laid_down_drive,
 )
 from sandmould.scenario.scenario import Scenario
-from sandmould.statistics.verdict import Verdict
 
 _COLUMNS = (DISPLACEMENT, VELOCITY, ACCELERATION)
 
@@ -81,23 +79,6 @@ def drive_at(
         width = np.maximum(np.ptp(at, axis=0), np.finfo(float).tiny)
         found = values[int((((at - wanted) / width) ** 2).sum(axis=1).argmin())]
     return dict(zip(_COLUMNS, found.tolist(), strict=True))
-
-
-def with_amplitudes(verdict: Verdict, drives: Mapping[str, BoxDrive]) -> Verdict:
-    """Say in the first sentence of a verdict how the box moves at its best setting.
-
-    Parameters
-    ----------
-    verdict : Verdict
-    drives : mapping of str to BoxDrive
-        By the label of the setting.
-    """
-    if verdict.best is None or verdict.best.label not in drives:
-        return verdict
-    moves = amplitudes_text(drives[verdict.best.label].columns())
-    where = "On the table that is" if verdict.resolved else f"At {verdict.best.label} the box moves"
-    first, *others = verdict.sentences
-    return replace(verdict, sentences=(f"{first} {where} {moves}.", *others))
 
 
 def amplitudes_text(drive: Mapping[str, float]) -> str:

@@ -10,21 +10,21 @@ import pandas as pd
 import scipy
 from numpy.typing import NDArray
 
-from sandmould.analysis.filling import Limb, first_reach_s, fit_limbs
+from sandmould.analysis.filling import Limb, fit_limbs
 from sandmould.definition.study import Study
 from sandmould.drawing.chart import Chart, Line, tints
 from sandmould.report.curves import are_on_a_scale, reported_lines, runs_by_setting, runs_of
 from sandmould.runs.columns import RUN, SOLID_FRACTION, VIBRATION_TIME_S, during_vibration
 from sandmould.runs.formatting import name_of, number, titled, value_text, with_margin
 from sandmould.scenario.scenario import Scenario
-from sandmould.statistics.evidence import barred
+from sandmould.statistics.config import FULL_SHARE
+from sandmould.statistics.evidence import left_out
 from sandmould.statistics.mean_tests import CONFIDENCE
+from sandmould.statistics.over_time import first_reach_s
 from sandmould.statistics.settings import Setting, setting_of
 from sandmould.statistics.verdict import Verdict
 from sandmould.study.collect import Collected
 
-FULL_SHARE = 0.95
-"""Of the sand that a cavity holds when it is packed as the bed is."""
 SHARES = (0.125, 0.25, 0.5, 1.0)
 """Of the vibration: the times of the chart."""
 _EARLY = 1 + SHARES.index(0.25)
@@ -76,7 +76,7 @@ def filling_pages(
 def _shaken(collected: Collected, measure: str) -> pd.DataFrame:
     """Curves of usable runs during vibration."""
     summary, curves = collected.summary, collected.curves
-    used = summary.loc[barred(summary, measure) == "", RUN]
+    used = summary.loc[left_out(summary, measure) == "", RUN]
     return during_vibration(curves[curves[RUN].isin(used)])
 
 

@@ -22,7 +22,7 @@ from sandmould.scenario.scenario import Scenario
 from sandmould.scenario.stages import StageKind, is_filling
 from sandmould.scenario.vibration import STANDARD_GRAVITY_M_S2
 from sandmould.statistics.robustness import Robustness, assess_robustness, shaken_runs
-from sandmould.statistics.spring_dependence import FOLLOWS, SpringCheck, assess_springs
+from sandmould.statistics.spring_dependence import SpringCheck, assess_springs
 from sandmould.study.collect import Collected
 from sandmould.study.plan.plan_files import read_run
 from sandmould.study.robustness.controls import SHAKE_G, cases
@@ -208,12 +208,6 @@ def _spring_table(springs: SpringCheck) -> Table:
             )
             marked.append(not is_inner)
     return Table(columns, tuple(rows), tuple(marked))
-
-
-def follows_springs(pages: RobustnessPages | None) -> bool:
-    """Whether the best frequency goes with the hardness of the sand; not without controls."""
-    springs = pages.assessment.springs if pages is not None else None
-    return springs is not None and springs.own.dependence == FOLLOWS
 
 
 def opening_sentences(pages: RobustnessPages, measure: str) -> tuple[str, ...]:

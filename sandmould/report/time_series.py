@@ -8,8 +8,11 @@ from dataclasses import dataclass
 from sandmould.drawing.chart import Chart
 from sandmould.drawing.figure_files import numbered
 from sandmould.drawing.thinning import drawn_part
-from sandmould.report.curves import best_passage, time_chart
+from sandmould.report.curves import runs_of, time_chart
+from sandmould.runs.columns import RUN
 from sandmould.runs.formatting import display_scale, name_of, number
+from sandmould.statistics.evidence import left_out
+from sandmould.statistics.over_time import Passage, passage_of
 from sandmould.statistics.verdict import Verdict
 from sandmould.study.collect import Collected
 
@@ -54,14 +57,21 @@ def curve_figures(curves: Iterable[Curve]) -> dict[str, Chart]:
     return numbered("curves", (curve.chart for curve in curves))
 
 
+def best_passage(collected: Collected, verdict: Verdict, measure: str) -> Passage | None:
+    """A measure of the best setting over its vibration; None where no run tells."""
+    if verdict.best is None:
+        return None
+    rows = runs_of(collected.summary, verdict.best)
+    return passage_of(collected.curves, rows.loc[left_out(rows, measure) == "", RUN], measure)
+
+
 def late_conclusion(collected: Collected, verdict: Verdict, measure: str) -> str:
     """Whether the measure still changed at the end, at the best setting."""
     passage = best_passage(collected, verdict, measure)
-    if verdict.best is None or passage is None or passage[1] == 0:
+    if verdict.best is None or passage is None or passage.late == 0:
         return ""
-    where, what = verdict.best.label, name_of(measure)
-    change = passage[2] / passage[1] - 1
-    if abs(change) < 0.02:
+    where, what, change = verdict.best.label, name_of(measure), passage.change
+    if not change:
         return f"At {where} it changed by less than 2 % in the last quarter of the vibration."
     way = "rose" if change > 0 else "fell"
     return (
@@ -75,6 +85,6 @@ def whole_conclusion(collected: Collected, verdict: Verdict, measure: str) -> st
     passage = best_passage(collected, verdict, measure)
     if verdict.best is None or passage is None:
         return ""
-    first, _, last = (display_scale(measure)[0] * v for v in passage)
+    first, last = (display_scale(measure)[0] * v for v in (passage.first, passage.last))
     way = "rose" if last > first else "fell"
     return f"At {verdict.best.label} it {way} from {number(first)} to {number(last)}."

@@ -72,6 +72,11 @@ class Robustness:
         return self.cause.startswith("artefact") or self.cause == "no inner optimum"
 
     @property
+    def follows_springs(self) -> bool:
+        """Whether the best frequency goes with the hardness of the sand."""
+        return self.springs is not None and self.springs.own.dependence == FOLLOWS
+
+    @property
     def is_sound(self) -> bool:
         """Whether the optimum is one, and the controls say what it belongs to."""
         return not self.is_artefact and self.cause != "unresolved"

@@ -14,13 +14,14 @@ from sandmould.drawing.chart import Chart
 from sandmould.kinds.kind import ScenarioT
 from sandmould.report.bed_mode import BedMode
 from sandmould.report.method import Row
-from sandmould.report.next_steps import NextStep
 from sandmould.report.repose_figures import Heap
 from sandmould.report.robustness import RobustnessPages
 from sandmould.report.sureness import Ground
 from sandmould.scenario.drive import BoxDrive
+from sandmould.statistics.answer import Answer
 from sandmould.statistics.verdict import Verdict
 from sandmould.study.collect import Collected
+from sandmould.wording.next_steps import NextStep
 
 
 @dataclass(frozen=True)
@@ -59,11 +60,18 @@ class Findings(Generic[ScenarioT]):
     """Address of the study's folder, seen from the report."""
     study: Study
     collected: Collected
-    verdict: Verdict
+    answer: Answer
     scenario: ScenarioT
     """Of the run that is shown."""
     by_setting: Mapping[str, tuple[ScenarioT, pd.DataFrame]]
     """Scenario and rows of the summary of the settings that are listed, by label."""
+    notes: tuple[str, ...]
+    """What the simulation leaves open."""
+
+    @property
+    def verdict(self) -> Verdict:
+        """All settings, compared."""
+        return self.answer.verdict
 
     @property
     def scenarios(self) -> Mapping[str, ScenarioT]:

@@ -11,9 +11,10 @@ import pytest
 from sandmould.engines.snapshot import Snapshot
 from sandmould.kinds.sand.measure import write_measures
 from sandmould.kinds.sand.moments import list_moments, nearest
-from sandmould.report.curves import best_passage, time_chart
+from sandmould.report.curves import time_chart
 from sandmould.report.method import measured_when
 from sandmould.report.sand import _chosen
+from sandmould.report.time_series import best_passage
 from sandmould.runs.columns import during_vibration
 from sandmould.statistics.verdict import compare_settings
 from sandmould.study.collect import gather
@@ -69,7 +70,7 @@ def test_curves_end_with_the_vibration(study: Path) -> None:
         assert line.xy[-1, 1] > 0.05
     passage = best_passage(found, verdict, FILL)
     assert passage is not None
-    assert passage[2] > 0.05
+    assert passage.last > 0.05
 
 
 def test_pictures_and_profiles_of_the_end_show_the_sand_at_rest(study: Path) -> None:
