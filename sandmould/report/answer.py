@@ -31,6 +31,7 @@ from sandmould.statistics.settings import Setting
 from sandmould.statistics.verdict import Verdict
 from sandmould.wording.answer import AnswerWords, place_text
 from sandmould.wording.next_steps import NextSteps
+from sandmould.wording.robustness import recommendation_sentence
 from sandmould.wording.templates import worded
 
 MOST_CHOICES = 4
@@ -80,12 +81,12 @@ def optimum_headline(
     if optimum is None:
         return pages.sentences[0], False
     if robustness is not None and robustness.assessment.is_artefact:
-        return robustness.assessment.sentences[0], False
+        return robustness.sentences[0], False
     ends = [end for key in optimum.keys if (end := optimum.at_end(key))]
     if advised is not None and advised.interval_hz is None:
         follows = robustness is not None and robustness.assessment.follows_springs
         if not follows or has_speed or ends:
-            return advised.sentence, False
+            return recommendation_sentence(advised), False
         return worded("optimum.j2", places=[]), False
     places = []
     for key, value in optimum.setting.items():

@@ -151,7 +151,9 @@ def _page(study_folder: Path, home: Path, study: Study, collected: Collected) ->
     relative = os.path.relpath(study_folder.absolute(), home)
     href = "" if relative == "." else quote(Path(relative).as_posix()) + "/"
     scenario = _scenario_of(study_folder, [pictured_run] if pictured_run else []) or any_scenario
-    return Findings(study_folder, href, study, collected, answer, scenario, by_setting, notes)
+    return Findings(
+        study_folder, href, study, collected, verdict, answer, scenario, by_setting, notes
+    )
 
 
 def _stand_ins(study_folder: Path, runs: Iterable[str]) -> tuple[str, ...]:

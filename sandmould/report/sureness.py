@@ -87,7 +87,7 @@ def certificate_ground(study: Study, robustness: RobustnessPages | None) -> tupl
     if not study.seeks_best or not frequency_key(study.sweep):
         return ()
     if robustness is not None:
-        return (Ground("Certificate", robustness.assessment.sentences[0]),)
+        return (Ground("Certificate", robustness.sentences[0]),)
     text = (
         "Three tests of the best frequency have not been run. They show whether it changes with "
         "the model's springs, with what the table holds constant, and with the time step."

@@ -192,9 +192,9 @@ def optimum_steps(
         steps.append(step("rounds", f"refine: {{rounds: {study.refine.rounds + 2}}}"))
     if robustness is None:
         return steps
-    if robustness.cause == "artefact of what is held constant":
+    if robustness.cause == "held artefact":
         steps.append(step("hold"))
-    elif robustness.cause == "artefact of the numerics":
+    elif robustness.cause == "numerics artefact":
         steps.append(step("time_step"))
     elif study.certificate.sand_wave_speed is None and robustness.follows_springs:
         line = 'certificate: {sand_wave_speed: {low_m_s: ..., high_m_s: ..., by: "..."}}'

@@ -60,6 +60,8 @@ class Findings(Generic[ScenarioT]):
     """Address of the study's folder, seen from the report."""
     study: Study
     collected: Collected
+    verdict: Verdict
+    """All settings, compared."""
     answer: Answer
     scenario: ScenarioT
     """Of the run that is shown."""
@@ -67,11 +69,6 @@ class Findings(Generic[ScenarioT]):
     """Scenario and rows of the summary of the settings that are listed, by label."""
     notes: tuple[str, ...]
     """What the simulation leaves open."""
-
-    @property
-    def verdict(self) -> Verdict:
-        """All settings, compared."""
-        return self.answer.verdict
 
     @property
     def scenarios(self) -> Mapping[str, ScenarioT]:
