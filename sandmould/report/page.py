@@ -242,7 +242,7 @@ def _render(
         both_sizes=_both_sizes,
         multiples=small_multiples,
         half_sizes=lambda chart: (lay_out(chart, SMALL), lay_out(chart, NARROW)),
-        advice=(*of_kind.advice, *([] if optimum else _beside_mode(page, mode))),
+        advice=[] if optimum else _beside_mode(page, mode),
         warning=of_kind.warning,
         reported_best=page.study.objective.reported_best,
         **of_kind.context,

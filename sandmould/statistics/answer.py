@@ -35,7 +35,7 @@ class Decided(StrEnum):
     REACHED = "reached"
     """One setting or several reach the target."""
     BEST = "best"
-    BEST_AT_END = "best at an end"
+    BEST_AT_END = "at an end"
     OPEN = "open"
 
 

@@ -39,8 +39,6 @@ class KindPages:
     """What is written as files too, by name."""
     beside: Mapping[str, str] = field(default_factory=dict)
     """Scripts for the folder ``SPHERES`` beside the page, by file name."""
-    advice: tuple[str, ...] = ()
-    """What follows the verdict."""
     answer: str = ""
     """Answers the title's question in one sentence; empty where the objective does."""
     grounds: tuple[Ground, ...] = ()

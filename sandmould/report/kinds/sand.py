@@ -67,7 +67,6 @@ def _pages(findings: Findings[Scenario], film_budget_bytes: int) -> KindPages:
         },
         _sand_figures(pages, filling, bending, loose is not None),
         pages["beside"],
-        advice=filling.advice if filling else (),
         grounds=(
             *sand_grounds(scenario, study, verdict),
             *weak_ground(findings.scenarios),
@@ -112,7 +111,7 @@ def _sand_figures(
         files["sand"] = strip([(panel["heading"], panel["by_layer"]) for panel in panels])
     if panels and has_loose:
         files["density"] = strip([(panel["heading"], panel["by_density"]) for panel in panels])
-    if filling and filling.chart:
+    if filling:
         files["filling"] = filling.chart
     if bending:
         files |= pictures(pattern=bending["outlines"])
