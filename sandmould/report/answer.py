@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from dataclasses import dataclass
 
 import pandas as pd
@@ -34,8 +34,8 @@ from sandmould.wording.next_steps import NextSteps
 from sandmould.wording.robustness import recommendation_sentence
 from sandmould.wording.templates import worded
 
-MOST_CHOICES = 4
-"""Settings that are shown in words of the machine where several may be the best."""
+MOST_CHOICES = 12
+"""Settings that the first screen lists."""
 _OF_DRIVE = ("frequency_hz", "acceleration_g", "velocity_m_s", "displacement_m")
 """Ends of swept keys that the motion of the box states."""
 
@@ -51,7 +51,7 @@ class FirstScreen:
     figures: tuple[KeyNumber, ...]
     """What to set and what comes of it; empty where several settings may be the best."""
     table: Table | None
-    """The same of all these settings."""
+    """What each of several settings does."""
     grounds: tuple[Ground, ...]
     """How sure it is."""
     steps: NextSteps
@@ -121,8 +121,8 @@ def _as_drive(drive: Mapping[str, float] | None) -> BoxDrive | None:
     return BoxDrive(frequency_hz, drive[DISPLACEMENT])
 
 
-def choices_of(answer: Answer, summary: pd.DataFrame) -> tuple[tuple[KeyNumber, ...], ...]:
-    """Settings that suit the question, the best first, in words of the machine.
+def figures_of(answer: Answer, summary: pd.DataFrame) -> tuple[KeyNumber, ...]:
+    """The one setting that suits the question in words of the machine; nothing where several do.
 
     Parameters
     ----------
@@ -130,52 +130,35 @@ def choices_of(answer: Answer, summary: pd.DataFrame) -> tuple[tuple[KeyNumber, 
     summary : DataFrame
         One row a run of the sweep.
     """
-    chosen = [answer.verdict.setting(label) for label in answer.wanted[:MOST_CHOICES]]
-    return tuple(_figures(s, answer, summary) for s in chosen)
+    if len(answer.wanted) != 1 or answer.beside:
+        return ()
+    return _figures(answer.verdict.setting(answer.wanted[0]), answer, summary)
 
 
-def trade_table(answer: Answer) -> Table | None:
-    """What each setting does for each thing asked; None where one thing is."""
+def table_of(answer: Answer) -> Table | None:
+    """What settings do for each thing asked; None where one suits it.
+
+    All settings where several things are asked, else those that suit.
+    """
     every = [AnswerWords(each) for each in (answer, *answer.beside)]
-    if len(every) == 1:
+    wanted = [answer.verdict.setting(label) for label in answer.wanted]
+    settings = (answer.used if answer.beside else wanted)[:MOST_CHOICES]
+    if len(settings) < 2:
         return None
     columns = (Column("setting", False), *(Column(of.space or of.name) for of in every))
-    rows = [
+    rows = tuple(
         (
-            Cell(setting.label, str(place)),
+            Cell(every[0].place(setting), str(place)),
             *(
                 Cell(of.worth(own), str(own.mean)) if own.n else Cell("–", "nan")
                 for of in every
                 for own in [of.answer.verdict.setting(setting.label)]
             ),
         )
-        for place, setting in enumerate(answer.used)
-    ]
-    marked = tuple(all(s.label in of.answer.wanted for of in every) for s in answer.used)
-    return Table(columns, tuple(rows), marked, "Marked: suits all of them." if any(marked) else "")
-
-
-def choices_table(choices: Sequence[Sequence[KeyNumber]]) -> Table:
-    """Several settings below each other, what they share said once below the table.
-
-    Parameters
-    ----------
-    choices : sequence of sequence of KeyNumber
-        As ``choices_of`` gives them, of two settings or more.
-    """
-    first, *others = choices
-    shared = [
-        it.note
-        for place, it in enumerate(first)
-        if it.note and all(other[place].note == it.note for other in others)
-    ]
-    columns = tuple(Column(it.label) for it in first)
-    rows = tuple(
-        tuple(Cell(it.value, it.value, note="" if it.note in shared else it.note) for it in choice)
-        for choice in choices
+        for place, setting in enumerate(settings)
     )
-    note = "; ".join(shared)
-    return Table(columns, rows, (False,) * len(rows), f"{note[:1].upper()}{note[1:]}.")
+    marked = tuple(bool(answer.beside) and s.label in answer.common for s in settings)
+    return Table(columns, rows, marked)
 
 
 def optimum_choice(

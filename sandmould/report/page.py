@@ -27,11 +27,10 @@ from sandmould.kinds.registry import kind_named
 from sandmould.report.agreement import AgreementPages, agreement_pages
 from sandmould.report.answer import (
     FirstScreen,
-    choices_of,
-    choices_table,
+    figures_of,
     optimum_choice,
     optimum_headline,
-    trade_table,
+    table_of,
 )
 from sandmould.report.bed_mode import BedMode
 from sandmould.report.curves import objective_charts
@@ -64,6 +63,7 @@ from sandmould.runs.columns import RUN, finished
 from sandmould.runs.files import replaced, write_text
 from sandmould.runs.formatting import name_of, setting_text
 from sandmould.scenario.drive import BoxDrive
+from sandmould.scenario.quantity import Section
 from sandmould.statistics.answer import Asked
 from sandmould.statistics.decision import Evidence, decide
 from sandmould.statistics.settings import setting_rows
@@ -144,10 +144,16 @@ def _page(study_folder: Path, home: Path, study: Study, collected: Collected) ->
             if own is not None:
                 by_setting[label] = own, summary.iloc[rows]
     by_lot = kind_named(study.kind).draws_by_lot
-    asked = Asked(objective.measure, objective.better, keys, objective.goal, by_lot)
-    stand_ins = _stand_ins(study_folder, summary[RUN])
-    curves = collected.of_sweep.curves
-    answer = decide(asked, Evidence(summary, curves, _drives(by_setting), stand_ins))
+    varied = tuple(key for key in keys if summary[key].astype(str).nunique() > 1)
+    asked = Asked(objective.measure, objective.better, varied, objective.goal, by_lot)
+    drives = _drives(by_setting)
+    of_varied = {
+        setting_text({key: s.values[key] for key in varied}): drives[s.label]
+        for s in verdict.settings
+        if s.label in drives
+    }
+    stand_ins = _stand_ins(study_folder, summary[RUN], kind_named(study.kind).material)
+    answer = decide(asked, Evidence(summary, collected.of_sweep.curves, of_varied, stand_ins))
     relative = os.path.relpath(study_folder.absolute(), home)
     href = "" if relative == "." else quote(Path(relative).as_posix()) + "/"
     scenario = _scenario_of(study_folder, [pictured_run] if pictured_run else []) or any_scenario
@@ -156,12 +162,19 @@ def _page(study_folder: Path, home: Path, study: Study, collected: Collected) ->
     )
 
 
-def _stand_ins(study_folder: Path, runs: Iterable[str]) -> tuple[str, ...]:
-    """Keys of values that are not what they stand for, by their sources in the first run."""
+def _stand_ins(
+    study_folder: Path, runs: Iterable[str], material: type[Section] | None
+) -> tuple[str, ...]:
+    """Values of materials that are not what they stand for, by their sources in the first run."""
+    sections = tuple(f"{name}." for name in material.model_fields) if material else ()
     for run in runs:
         with contextlib.suppress(BadInputError, OSError):
             sources = read_run(study_folder / "runs" / str(run) / "scenario.yaml").sources
-            return tuple(key for key, source in sources.items() if source.startswith(STAND_IN))
+            return tuple(
+                key
+                for key, source in sources.items()
+                if key.startswith(sections) and source.startswith(STAND_IN)
+            )
     return ()
 
 
@@ -283,9 +296,7 @@ def _first_screen(
         headline = of_kind.answer or estimate.headline or headline
         steps += sand_steps(study, is_sound)
     else:
-        choices = choices_of(answer, summary)
-        figures = choices[0] if len(choices) == 1 else ()
-        table = trade_table(answer) or (choices_table(choices) if len(choices) > 1 else None)
+        figures, table = figures_of(answer, summary), table_of(answer)
     grounds = (
         *finished_ground(answer),
         *of_kind.grounds,
