@@ -184,7 +184,7 @@ def settings_table(verdict: Verdict, drives: Mapping[str, BoxDrive]) -> Table:
         standing = "best mean" if is_best else "no run"
         if against is not None:
             difference, p = against.difference, against.p
-            standing = "too few runs"
+            standing = "not tested"
             if against.tested:
                 interval = f"{number(against.ci[0], 2)} to {number(against.ci[1], 2)}"
                 standing = "worse" if against.separated else "undecided"

@@ -125,14 +125,14 @@ def _stand_ins(path: Path) -> tuple[str, ...]:
     if not keys:
         return ()
     names = [f"{key.rpartition('.')[0].replace('.', ' ')} {name_of(key)}" for key in keys]
-    return (f"Stand-ins by their sources, so that times are those of no real casting: "
+    return (f"Placeholder values, so do not use these times for your alloy: "
             f"{listed(names, most=20)}.",)  # fmt: skip
 
 
 def _grounds(has_stand_ins: bool, scenario: Solidification) -> tuple[Ground, ...]:
     """What the answer rests on."""
     values = (
-        "some are stand-ins, so that the times are those of no real casting."
+        "some are placeholders: do not use these times for your alloy."
         if has_stand_ins
         else "those of the study's sources."
     )
@@ -181,7 +181,7 @@ def _fields(folder: Path, scenario: Solidification) -> tuple[str, tuple[str, ...
             for axis, place_m in zip("xyz", frozen.last_point_m, strict=False)
         )
         said = (
-            f"The casting is solid after {number(frozen.solidification_time_s, 4)} s; the last "
+            f"The casting is solid after {number(frozen.solidification_time_s)} s; the last "
             f"point to freeze lies at {at}."
         )
     axes = [Column(f"{name}, mm") for name in "yz"[: scenario.dimensions - 1]]
