@@ -9,7 +9,6 @@ import numpy as np
 import pandas as pd
 
 from sandmould.runs.columns import finished
-from sandmould.runs.formatting import number
 from sandmould.scenario.drive import (
     ACCELERATION,
     DISPLACEMENT,
@@ -79,11 +78,3 @@ def drive_at(
         width = np.maximum(np.ptp(at, axis=0), np.finfo(float).tiny)
         found = values[int((((at - wanted) / width) ** 2).sum(axis=1).argmin())]
     return dict(zip(_COLUMNS, found.tolist(), strict=True))
-
-
-def amplitudes_text(drive: Mapping[str, float]) -> str:
-    """Amplitudes as a person sets a table: ``0.15 mm to either side, 47 mm/s and 1.5 g``."""
-    return (
-        f"{number(1e3 * drive[DISPLACEMENT])} mm to either side, "
-        f"{number(1e3 * drive[VELOCITY])} mm/s and {number(drive[ACCELERATION])} g"
-    )

@@ -15,7 +15,6 @@ from sandmould.definition.study import Study
 from sandmould.drawing.chart import PLAIN, Chart, Line, tints
 from sandmould.report.bed_mode import BedMode
 from sandmould.report.curves import reported_lines
-from sandmould.report.drive import amplitudes_text, drive_at
 from sandmould.report.robustness import RobustnessPages
 from sandmould.runs.columns import CPU_S, total_s
 from sandmould.runs.formatting import (
@@ -91,9 +90,6 @@ def optimum_pages(
         if optimum.interval(key)[1] - optimum.interval(key)[0] > width
     ]
     said = [_where(optimum, study, ends), *(_flat(optimum, study, key) for key in keys)]
-    drive = drive_at(summary, keys, optimum.setting)
-    if drive is not None:
-        said.insert(1, f"At this setting the box moves {amplitudes_text(drive)}.")
     if mode and (key := frequency_key(study.sweep)):
         said.insert(1, mode.beside(optimum.setting[key]))
     said += _beside(optimum, study)
@@ -134,8 +130,8 @@ def _where(optimum: Optimum, study: Study, ends: list[str]) -> str:
         for end in [optimum.at_end(key)]
     ]
     return (
-        f"Not resolved: among what was swept the {what} is {most} at {where}, but the interval "
-        f"reaches {listed(reached)}, so the optimum may lie beyond."
+        f"Among what was swept the {what} is {most} at {where}, but the interval reaches "
+        f"{listed(reached)}, so the optimum may lie beyond."
     )
 
 

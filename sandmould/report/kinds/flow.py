@@ -104,7 +104,7 @@ def _pages(findings: Findings[MetalFlow], film_budget_bytes: int) -> KindPages:
         "fields": fields,
         "films": films,
         "colours": COLOURS,
-        "curves": measure_curves(collected, findings.verdict, measures, lambda *_: ""),
+        "curves": measure_curves(collected, findings.verdict, measures),
         "pours": not isinstance(scenario.case, StillTank),
     }
     return KindPages(
@@ -183,7 +183,7 @@ def _sentences(
 def _calm(scenario: MetalFlow, ranked: pd.DataFrame, keys: Sequence[str]) -> str:
     """At which settings the pressure stays calm, the calmest first."""
     if ranked.empty:
-        return "Not resolved: no run finished."
+        return "No run finished, so there is no answer."
     labels = [setting_text({key: row[key] for key in keys}) for _, row in ranked.iterrows()]
     verdicts = list(ranked[CLASSIFICATION])
     # the calmest come first

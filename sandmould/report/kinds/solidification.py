@@ -71,7 +71,7 @@ def _pages(findings: Findings[Solidification], film_budget_bytes: int) -> KindPa
     run = _pictured_run(reference, collected, best)
     folder = findings.study_folder / "runs" / run
     probes = [f"{probe.name}_k" for probe in scenario.probes]
-    curves = measure_curves(collected, verdict, [*probes, "solidified_fraction"], lambda *_: "")
+    curves = measure_curves(collected, verdict, [*probes, "solidified_fraction"])
     fields, sentences, spots = _fields(folder, scenario)
     errors = _errors(reference, scenario, collected) if reference else []
     error_cost = _error_charts(errors)

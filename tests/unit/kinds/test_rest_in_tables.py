@@ -14,8 +14,8 @@ from sandmould.kinds.sand.moments import list_moments, nearest
 from sandmould.report.curves import time_chart
 from sandmould.report.method import measured_when
 from sandmould.report.sand import _chosen
-from sandmould.report.time_series import best_passage
 from sandmould.runs.columns import during_vibration
+from sandmould.statistics.over_time import passage_of
 from sandmould.statistics.verdict import compare_settings
 from sandmould.study.collect import gather
 from tests.unit.report_study import DURATION_S, FILLING_S, KEY, PLANTED, scenario, write_study
@@ -68,7 +68,7 @@ def test_curves_end_with_the_vibration(study: Path) -> None:
     for line in chart.lines:
         assert (np.diff(line.xy[:, 0]) > 0.0).all()
         assert line.xy[-1, 1] > 0.05
-    passage = best_passage(found, verdict, FILL)
+    passage = passage_of(found.curves, [RUN], FILL)
     assert passage is not None
     assert passage.last > 0.05
 
