@@ -5,14 +5,14 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass
-from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pandas as pd
 
 from sandmould.definition.study import Study
 from sandmould.drawing.figure_files import pictures, strip
-from sandmould.kinds.kind import AnyScenario
+from sandmould.report.kinds.kind import Findings
 from sandmould.report.kinds.registry import report_of
 from sandmould.report.repose_figures import Heap, draw_map, draw_posterior, plotted
 from sandmould.report.tables import Cell, Column, Table
@@ -26,13 +26,11 @@ from sandmould.runs.formatting import (
     unit_of,
     with_margin,
 )
-from sandmould.statistics.answer import Answer
 from sandmould.statistics.calibration.sands import Calibrated, CalibratedSand
 from sandmould.statistics.emulator import TooFewRunsError, fit_emulator
 from sandmould.statistics.evidence import usable_values
 from sandmould.statistics.settings import Setting
 from sandmould.study.calibration.run import read_calibrated
-from sandmould.study.collect import Collected
 from sandmould.wording.answer import detail_sentences, first_sentence
 
 
@@ -69,24 +67,13 @@ class EstimatePages:
         return bool(self.heaps or self.map or self.sands or self.worths)
 
 
-def estimate_pages(
-    study_folder: Path, study: Study, collected: Collected, answer: Answer, scenario: AnyScenario
-) -> EstimatePages | None:
-    """Draw what a study found that asks for a value, not for the best; None for other studies.
-
-    Parameters
-    ----------
-    study_folder : Path
-    study : Study
-    collected : Collected
-    answer : Answer
-    scenario : Scenario
-        Of any run.
-    """
+def estimate_pages(page: Findings[Any]) -> EstimatePages | None:
+    """Draw what a study found that asks for a value, not for the best; None for other studies."""
+    study_folder, study, answer, verdict = page.study_folder, page.study, page.answer, page.verdict
     if study.objective.better != "neither":
         return None
-    summary, keys = collected.of_sweep.summary, collected.keys
-    verdict, settings = answer.verdict, answer.used
+    summary, keys = page.collected.of_sweep.summary, page.collected.keys
+    settings = [s for s in verdict.settings if s.n]
     calibrated = read_calibrated(study_folder, study, summary, keys)
     sands = tuple(_sand(sand, calibrated) for sand in calibrated.sands) if calibrated else ()
     sentences = [*detail_sentences(answer), *_reported(settings, verdict.measure, study)]
@@ -100,7 +87,7 @@ def estimate_pages(
         headline=_headline(sands),
         sentences=tuple(sentences) or (first_sentence(answer),),
         sound=bool(settings) and all(sand.posterior for sand in sands),
-        heaps=report_of(scenario).heaps(study_folder, summary, verdict, scenario),
+        heaps=report_of(page.scenario).heaps(study_folder, summary, verdict, page.scenario),
         map=_map_table(settings, (keys[0], keys[1])) if is_map and settings else None,
         map_picture=_map_picture(summary, keys, verdict.measure, calibrated) if is_map else "",
         sands=sands,

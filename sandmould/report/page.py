@@ -204,7 +204,7 @@ def _render(
     summary = page.collected.summary
     seeks_best = page.study.seeks_best
     agreement = agreement_pages(page.collected, page.study)
-    estimate = estimate_pages(page.study_folder, page.study, page.collected, answer, page.scenario)
+    estimate = estimate_pages(page)
     kind = report_of(page.scenario)
     robustness = kind.robustness(page)
     mode = robustness.mode if robustness else kind.mode(page)
