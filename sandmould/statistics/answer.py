@@ -53,7 +53,7 @@ class Asked:
 
 
 @dataclass(frozen=True)
-class End:
+class SweepEnd:
     """An end of the sweep at which the best setting lies."""
 
     key: str
@@ -76,7 +76,7 @@ class Answer:
     shortest: Setting | None = None
     """That of them which reaches it first, where the runs tell."""
     shortest_s: float = 0.0
-    ends: tuple[End, ...] = ()
+    ends: tuple[SweepEnd, ...] = ()
     further_runs: int | None = None
     """More runs of each open setting that would decide; None where no number would."""
     numerical_error: float | None = None

@@ -11,7 +11,7 @@ import pandas as pd
 from sandmould.runs.columns import OF_RUN, RUN
 from sandmould.runs.formatting import OF_BED, filled_space, is_number, setting_text
 from sandmould.scenario.drive import BoxDrive
-from sandmould.statistics.answer import Answer, Asked, Decided, End
+from sandmould.statistics.answer import Answer, Asked, Decided, SweepEnd
 from sandmould.statistics.config import FULL_SHARE, Goal
 from sandmould.statistics.evidence import left_out_counts, one_way_runs, usable_values
 from sandmould.statistics.over_time import passage_of, reached_s
@@ -170,7 +170,7 @@ def _runs(summary: pd.DataFrame, asked: Asked, setting: Setting) -> list[str]:
     return []
 
 
-def _ends(best: Setting, settings: Sequence[Setting], keys: Sequence[str]) -> tuple[End, ...]:
+def _ends(best: Setting, settings: Sequence[Setting], keys: Sequence[str]) -> tuple[SweepEnd, ...]:
     """Ends of swept numbers at which the best lies: the true best may lie beyond."""
     found = []
     for key in keys:
@@ -180,7 +180,7 @@ def _ends(best: Setting, settings: Sequence[Setting], keys: Sequence[str]) -> tu
         mine, low, high = float(best.values[key]), min(values), max(values)
         # Below nothing there is no value to try.
         if low < high and mine in (low, high) and mine != 0.0:
-            found.append(End(key, mine, mine == high))
+            found.append(SweepEnd(key, mine, mine == high))
     return tuple(found)
 
 

@@ -197,7 +197,7 @@ class AnswerWords:
     @staticmethod
     def seconds(time_s: float) -> str:
         """A duration."""
-        return f"{number(time_s, 2)} s" if time_s < 60.0 else seconds(time_s)
+        return f"{time_s:.2g} s" if time_s < 60.0 else seconds(time_s)
 
     @property
     def target(self) -> str:
