@@ -75,29 +75,3 @@ def _limb(x: NDArray[np.float64], y: NDArray[np.float64], se: NDArray[np.float64
     rest = b - np.average(b, weights=weight) - slope * (a - middle)
     chi2 = float(np.sum(weight * rest**2)) / (len(x) - 2)
     return Limb(slope, math.sqrt(max(1.0, chi2) / spread), len(x))
-
-
-def first_reach_s(time_s: ArrayLike, value: ArrayLike, level: float) -> float:
-    """Time at which a quantity first reaches a level, between two records by straight line.
-
-    Parameters
-    ----------
-    time_s, value : (n,) float64
-        In order of time.
-    level : float
-
-    Returns
-    -------
-    float, s
-        NaN where it never does.
-    """
-    time_s, value = np.asarray(time_s, dtype=np.float64), np.asarray(value, dtype=np.float64)
-    above = np.flatnonzero(value >= level)
-    if not len(above):
-        return math.nan
-    after = int(above[0])
-    if after == 0:
-        return float(time_s[0])
-    before = after - 1
-    share = (level - value[before]) / (value[after] - value[before])
-    return float(time_s[before] + share * (time_s[after] - time_s[before]))

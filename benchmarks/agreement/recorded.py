@@ -10,9 +10,10 @@ from typing import Any
 
 from sandmould import ROOT
 from sandmould.runs.columns import REPLICATE
-from sandmould.statistics.agreement import Compared, EngineSpeed, agreement_sentences, speeds
+from sandmould.statistics.agreement import Compared, EngineSpeed, speeds
 from sandmould.study.collect import compare_study, read_summary, swept_keys
 from sandmould.study.plan.load_study import open_study
+from sandmould.wording.agreement import agreement_sentences
 
 
 @dataclass(frozen=True)

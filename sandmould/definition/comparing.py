@@ -7,14 +7,14 @@ from collections.abc import Iterator
 from sandmould.bad_input import Problem
 from sandmould.definition.study import CrossCheck, Study
 from sandmould.definition.sweep import Sweep, points
-from sandmould.statistics.config import Equivalence
+from sandmould.statistics.config import FULL, Equivalence, Objective
 
 ENGINE = "engine.name"
 
 
 def problems(study: Study) -> list[Problem]:
     """List what is wrong with the comparisons of a study whose sweep has no problems."""
-    misfits = list(_equivalence(study.equivalence, study.sweep))
+    misfits = [*_target(study.objective), *_equivalence(study.equivalence, study.sweep)]
     if study.cross_check is not None:
         misfits += _cross_check(study.cross_check, study)
     compares = bool(study.equivalence.keys) or study.cross_check is not None
@@ -22,6 +22,26 @@ def problems(study: Study) -> list[Problem]:
         valid = "at least one measure with its margin, such as solid_fraction: 0.005"
         misfits.append(Problem("equivalence.margins", {}, valid))
     return misfits
+
+
+def _target(objective: Objective) -> Iterator[Problem]:
+    """A target needs a better side, and lies on the scale of its measure."""
+    target = objective.target
+    if target is None:
+        return
+    valid = ""
+    if objective.better == "neither":
+        valid = "absent where objective.better is neither"
+    elif target == FULL and not (objective.is_fill and objective.better == "larger"):
+        valid = f"a value of {objective.measure}: {FULL} is for the fill of a tube or cavity"
+    elif (
+        isinstance(target, float)
+        and objective.measure.endswith("_fraction")
+        and not 0.0 < target <= 1.0
+    ):
+        valid = "above 0 and at most 1"
+    if valid:
+        yield Problem("objective.target", target, valid)
 
 
 def _equivalence(equivalence: Equivalence, sweep: Sweep) -> Iterator[Problem]:

@@ -14,12 +14,12 @@ from sandmould.report.tables import Cell, Column, Table
 from sandmould.runs.formatting import listed, name_of, number, seconds, titled
 from sandmould.statistics.agreement import (
     Compared,
-    agreement_sentences,
     interval_text,
     speeds,
 )
 from sandmould.statistics.equivalence import PERCENT
 from sandmould.study.collect import Collected, compare_study
+from sandmould.wording.agreement import agreement_sentences
 
 _TINTS = {
     "equivalent": Tint("#00694b", "#5fd0a5"),

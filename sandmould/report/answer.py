@@ -3,24 +3,19 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from dataclasses import dataclass
 
 import pandas as pd
 
-from sandmould.definition.certificate import frequency_among
 from sandmould.report.drive import drive_at
-from sandmould.report.filling import FULL_SHARE
-from sandmould.report.next_steps import NextSteps
 from sandmould.report.optimum import TWO_SIDED, OptimumPages
-from sandmould.report.robustness import RobustnessPages, follows_springs
+from sandmould.report.robustness import RobustnessPages
 from sandmould.report.sureness import Ground
 from sandmould.report.tables import Cell, Column, KeyNumber, Table, share_of_what_fits
 from sandmould.runs.formatting import (
-    OF_BED,
     display_scale,
     filled_space,
-    listed,
     name_of,
     number,
     range_text,
@@ -28,82 +23,44 @@ from sandmould.runs.formatting import (
     with_margin,
 )
 from sandmould.scenario.drive import DISPLACEMENT, VELOCITY, BoxDrive
+from sandmould.statistics.answer import Answer
+from sandmould.statistics.config import FULL_SHARE
 from sandmould.statistics.evidence import usable_values
+from sandmould.statistics.optimum import Optimum
 from sandmould.statistics.settings import Setting
 from sandmould.statistics.verdict import Verdict
+from sandmould.wording.answer import AnswerWords, place_text
+from sandmould.wording.next_steps import NextSteps
+from sandmould.wording.robustness import recommendation_sentence
+from sandmould.wording.templates import worded
 
-MOST_CHOICES = 4
-"""Settings that are shown in words of the machine where several may be the best."""
-_MOST_LABELS = 8
+MOST_CHOICES = 12
+"""Settings that the first screen lists."""
 _OF_DRIVE = ("frequency_hz", "acceleration_g", "velocity_m_s", "displacement_m")
 """Ends of swept keys that the motion of the box states."""
 
 
 @dataclass(frozen=True)
-class Answer:
+class FirstScreen:
     """What the first screen shows."""
 
     headline: str
-    """Answers the question of the title in one sentence."""
+    """Answers the question of the title in one sentence or a few short ones."""
     is_sound: bool
     """Whether the question is answered."""
     figures: tuple[KeyNumber, ...]
     """What to set and what comes of it; empty where several settings may be the best."""
     table: Table | None
-    """The same of all these settings."""
+    """What each of several settings does."""
     grounds: tuple[Ground, ...]
     """How sure it is."""
     steps: NextSteps
 
 
-def headline_of(
-    verdict: Verdict, keys: Sequence[str], drives: Mapping[str, BoxDrive]
-) -> tuple[str, bool]:
-    """Say in one sentence which setting to use, and whether the runs decide that.
-
-    Parameters
-    ----------
-    verdict : Verdict
-        Of a study that looks for the best setting.
-    keys : sequence of str
-        Swept keys.
-    drives : mapping of str to BoxDrive
-        By the label of the setting.
-    """
-    best, others = verdict.best, verdict.comparisons
-    if best is None:
-        return verdict.sentences[0], False
-    if not others:
-        return f"Not resolved: there are results of {best.label} alone, nothing to compare.", False
-    verb = "Shake at" if frequency_among(keys) and len(keys) == 1 else "Use"
-    if verdict.resolved:
-        motion = _motion(drives.get(best.label), keys)
-        return f"{verb} {best.label}{motion}: there {_best_text(verdict)}.", True
-    alike = _or([best.label, *(c.other for c in others if not c.separated)])
-    worse = [c.other for c in others if c.separated]
-    if not worse and _is_full_everywhere(verdict):
-        space = filled_space(verdict.measure).replace("_", " ")
-        return f"{verb} {alike}: the {space} is full at each, in the mean of the runs.", False
-    if not worse:
-        return f"Not resolved: these runs cannot tell which is best, {alike}.", False
-    are = "are" if len(worse) > 1 else "is"
-    return (
-        f"{verb} {alike}: these runs cannot tell which of them is best. "
-        f"{listed(worse, most=_MOST_LABELS)} {are} worse.",
-        False,
-    )
-
-
-def _is_full_everywhere(verdict: Verdict) -> bool:
-    """Whether sand fills what fits at every setting, where the measure is that share."""
-    is_share = verdict.measure.endswith(OF_BED) and verdict.better == "larger"
-    return is_share and all(setting.mean >= FULL_SHARE for setting in verdict.settings)
-
-
 def optimum_headline(
     pages: OptimumPages,
     robustness: RobustnessPages | None,
-    verdict: Verdict,
+    answer: Answer,
     summary: pd.DataFrame,
     has_speed: bool,
 ) -> tuple[str, bool]:
@@ -114,57 +71,46 @@ def optimum_headline(
     pages : OptimumPages
     robustness : RobustnessPages, optional
         Its controls.
-    verdict : Verdict
+    answer : Answer
     summary : DataFrame
         One row a run of the sweep.
     has_speed : bool
         Whether the study gives the wave speed of the real sand.
     """
-    optimum = pages.optimum
+    optimum, advised = pages.optimum, pages.recommendation
     if optimum is None:
         return pages.sentences[0], False
     if robustness is not None and robustness.assessment.is_artefact:
-        return robustness.assessment.sentences[0], False
-    advised = pages.recommendation
+        return robustness.sentences[0], False
+    ends = [end for key in optimum.keys if (end := optimum.at_end(key))]
     if advised is not None and advised.interval_hz is None:
-        ends = any(optimum.at_end(key) for key in optimum.keys)
-        if follows_springs(robustness) and not (has_speed or ends):
-            return (
-                "No frequency in Hz is recommended: the best one goes with the hardness of the "
-                "sand, and that of your sand is not given.",
-                False,
-            )
-        return advised.sentence, False
+        follows = robustness is not None and robustness.assessment.follows_springs
+        if not follows or has_speed or ends:
+            return recommendation_sentence(advised), False
+        return worded("optimum.j2", places=[]), False
     places = []
     for key, value in optimum.setting.items():
         low, high = optimum.interval(key) if advised is None else advised.interval_hz or (0, 0)
         name = "" if len(optimum.keys) == 1 else f"{name_of(key)} "
-        at = value_text(key, float(f"{value:.3g}"))
-        places.append(f"{name}{at} ({range_text(key, low, float(f'{high:.3g}'))})")
-    verb = "Shake at" if frequency_among(optimum.keys) and len(optimum.keys) == 1 else "Use"
-    drive = _as_drive(drive_at(summary, optimum.keys, optimum.setting))
-    motion = _motion(drive, optimum.keys)
-    if pages.sound:
-        return f"{verb} {listed(places)}{motion}: there {_best_text(verdict)}.", True
-    return (
-        f"Not resolved: by these runs the best is near {listed(places)}{motion}, but that is not "
-        "certain enough.",
-        False,
-    )
+        at = f"{name}{value_text(key, float(f'{value:.3g}'))}"
+        interval = f"95 %: {range_text(key, low, float(f'{high:.3g}'))}"
+        drive = _as_drive(drive_at(summary, optimum.keys, optimum.setting))
+        places.append(place_text(at, optimum.keys, drive, interval))
+    share = share_at(optimum, summary, answer.verdict.measure)
+    said = worded(
+        "optimum.j2", it=AnswerWords(answer), places=places, ends=ends, sound=pages.sound,
+        share="" if math.isnan(share) else f"{100 * share:.0f} %", is_full=share >= FULL_SHARE,
+    )  # fmt: skip
+    return said, pages.sound
 
 
-def _motion(drive: BoxDrive | None, keys: Sequence[str]) -> str:
-    """How the box moves, but for what the swept keys say."""
-    said = {key.rpartition(".")[2] for key in keys}
-    if drive is None:
-        return ""
-    amplitude = (
-        f" with an amplitude of {number(1e3 * drive.displacement_m)} mm, half of peak to peak"
-    )
-    acceleration = f" ({number(drive.acceleration_g)} g)"
-    return (amplitude if "displacement_m" not in said else "") + (
-        acceleration if "acceleration_g" not in said else ""
-    )
+def share_at(optimum: Optimum, summary: pd.DataFrame, measure: str) -> float:
+    """Share of what fits at the optimum; NaN where runs do not tell.
+
+    The bed is about as dense there as at the settings round it.
+    """
+    mean = float(usable_values(summary, measure).mean())
+    return share_of_what_fits(summary, measure) * optimum.value[0] / mean
 
 
 def _as_drive(drive: Mapping[str, float] | None) -> BoxDrive | None:
@@ -175,65 +121,44 @@ def _as_drive(drive: Mapping[str, float] | None) -> BoxDrive | None:
     return BoxDrive(frequency_hz, drive[DISPLACEMENT])
 
 
-def _best_text(verdict: Verdict) -> str:
-    """What is best there, as a clause."""
-    space = filled_space(verdict.measure)
-    if space != verdict.measure and verdict.better == "larger":
-        return f"the {space.replace('_', ' ')} fills best"
-    most = "highest" if verdict.better == "larger" else "lowest"
-    return f"the {name_of(verdict.measure)} is {most}"
-
-
-def _or(labels: Sequence[str]) -> str:
-    """Labels of which one is to be chosen."""
-    if len(labels) > _MOST_LABELS:
-        return f"{', '.join(labels[: _MOST_LABELS - 1])} or one of {len(labels)} settings in all"
-    comma = "; " if any("," in label for label in labels) else ", "
-    return f"{comma.join(labels[:-1])} or {labels[-1]}" if len(labels) > 1 else labels[0]
-
-
-def choices_of(
-    verdict: Verdict, summary: pd.DataFrame, drives: Mapping[str, BoxDrive]
-) -> tuple[tuple[KeyNumber, ...], ...]:
-    """Settings that may be the best, the best mean first, in words of the machine.
+def figures_of(answer: Answer, summary: pd.DataFrame) -> tuple[KeyNumber, ...]:
+    """The one setting that suits the question in words of the machine; nothing where several do.
 
     Parameters
     ----------
-    verdict : Verdict
+    answer : Answer
     summary : DataFrame
         One row a run of the sweep.
-    drives : mapping of str to BoxDrive
-        By label.
     """
-    if verdict.best is None:
+    if len(answer.wanted) != 1 or answer.beside:
         return ()
-    open_ = {c.other for c in verdict.comparisons if not c.separated}
-    ranked = [verdict.best, *(_setting(verdict, c.other) for c in verdict.comparisons)]
-    alike = [s for s in ranked if s is verdict.best or s.label in open_][:MOST_CHOICES]
-    return tuple(_figures(s, verdict, summary, drives.get(s.label)) for s in alike)
+    return _figures(answer.verdict.setting(answer.wanted[0]), answer, summary)
 
 
-def choices_table(choices: Sequence[Sequence[KeyNumber]]) -> Table:
-    """Several settings below each other, what they share said once below the table.
+def table_of(answer: Answer) -> Table | None:
+    """What settings do for each thing asked; None where one suits it.
 
-    Parameters
-    ----------
-    choices : sequence of sequence of KeyNumber
-        As ``choices_of`` gives them, of two settings or more.
+    All settings where several things are asked, else those that suit.
     """
-    first, *others = choices
-    shared = [
-        it.note
-        for place, it in enumerate(first)
-        if it.note and all(other[place].note == it.note for other in others)
-    ]
-    columns = tuple(Column(it.label) for it in first)
+    every = [AnswerWords(each) for each in (answer, *answer.beside)]
+    wanted = [answer.verdict.setting(label) for label in answer.wanted]
+    settings = (answer.used if answer.beside else wanted)[:MOST_CHOICES]
+    if len(settings) < 2:
+        return None
+    columns = (Column("setting", False), *(Column(of.space or of.name) for of in every))
     rows = tuple(
-        tuple(Cell(it.value, it.value, note="" if it.note in shared else it.note) for it in choice)
-        for choice in choices
+        (
+            Cell(every[0].place(setting), str(place)),
+            *(
+                Cell(of.worth(own), str(own.mean)) if own.n else Cell("–", "nan")
+                for of in every
+                for own in [of.answer.verdict.setting(setting.label)]
+            ),
+        )
+        for place, setting in enumerate(settings)
     )
-    note = "; ".join(shared)
-    return Table(columns, rows, (False,) * len(rows), f"{note[:1].upper()}{note[1:]}.")
+    marked = tuple(bool(answer.beside) and s.label in answer.common for s in settings)
+    return Table(columns, rows, marked)
 
 
 def optimum_choice(
@@ -266,11 +191,8 @@ def optimum_choice(
     factor, what = display_scale(verdict.measure)
     mean, se = optimum.value
     of_keys += _motion_figures(drive)
-    share = share_of_what_fits(summary, verdict.measure) * mean
-    used = usable_values(summary, verdict.measure)
+    share = share_at(optimum, summary, verdict.measure)
     if math.isfinite(share):
-        # the bed is about as dense at the optimum as at the settings round it
-        share /= float(used.mean())
         of_keys.append(_share_figure(share, verdict.measure, "of what fits in, about"))
     value = KeyNumber(
         with_margin(factor * mean, TWO_SIDED * factor * se),
@@ -286,14 +208,9 @@ def _share_figure(share: float, measure: str, label: str) -> KeyNumber:
     return KeyNumber(f"{100 * share:.0f} %", label, note)
 
 
-def _setting(verdict: Verdict, label: str) -> Setting:
-    return next(s for s in verdict.settings if s.label == label)
-
-
-def _figures(
-    setting: Setting, verdict: Verdict, summary: pd.DataFrame, drive: BoxDrive | None
-) -> tuple[KeyNumber, ...]:
+def _figures(setting: Setting, answer: Answer, summary: pd.DataFrame) -> tuple[KeyNumber, ...]:
     """What is set, how the box then moves, and what comes of it."""
+    verdict, drive = answer.verdict, answer.drives.get(setting.label)
     figures = [] if drive is None else [KeyNumber(f"{number(drive.frequency_hz)} Hz", "frequency")]
     figures += _motion_figures(drive)
     figures += [
@@ -302,12 +219,11 @@ def _figures(
         if drive is None or key.rpartition(".")[2] not in _OF_DRIVE
     ]
     share = share_of_what_fits(summary, verdict.measure, setting.values)
-    factor, what = display_scale(verdict.measure)
     runs = f"mean of {setting.n} runs, ± its 95 % interval" if setting.n > 1 else "one run"
-    mean = with_margin(factor * setting.mean, factor * setting.ci_half_width)
+    mean = AnswerWords(answer).value(setting.mean, setting.ci_half_width)
     if math.isfinite(share):
         figures.append(_share_figure(share, verdict.measure, "of what fits in"))
-    return (*figures, KeyNumber(mean, what, runs))
+    return (*figures, KeyNumber(mean, name_of(verdict.measure), runs))
 
 
 def _motion_figures(drive: BoxDrive | None) -> list[KeyNumber]:

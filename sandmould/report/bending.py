@@ -32,7 +32,7 @@ from sandmould.runs.columns import (
 from sandmould.runs.formatting import number, setting_text, with_margin
 from sandmould.scenario.pattern import PatternDrawing
 from sandmould.scenario.scenario import Scenario
-from sandmould.statistics.evidence import barred, usable_values
+from sandmould.statistics.evidence import left_out, usable_values
 from sandmould.statistics.settings import group_settings, setting_of
 from sandmould.statistics.verdict import Verdict
 from sandmould.study.collect import Collected
@@ -220,7 +220,7 @@ def deflection_chart(collected: Collected, verdict: Verdict) -> Chart | None:
     areas = []
     for setting in part.settings:
         rows = runs_of(drawn.summary, setting)
-        used = rows.loc[barred(rows, TIP) == "", RUN]
+        used = rows.loc[left_out(rows, TIP) == "", RUN]
         area = _area(aligned[aligned[RUN].isin(used)])
         if area is not None:
             said = f"{setting.label}: from the least to the greatest of {len(used)} runs"

@@ -54,8 +54,7 @@ class ComparedStudy:
 
     def settings(self, measure: str) -> tuple[Setting, ...]:
         """Means of a measure at its settings."""
-        summary = self.collected.of_sweep.summary
-        return compare_settings(summary, self.keys, measure, seeks_best=False).settings
+        return compare_settings(self.collected.of_sweep.summary, self.keys, measure).settings
 
     @cached_property
     def stated(self) -> dict[str, Any]:
@@ -89,8 +88,9 @@ class SideBySide:
     def labels(self) -> list[str]:
         """Settings of all studies, in rising order where they are numbers of one key."""
         values = {s.label: s.values for one in self._settings for s in one.values()}
-        keys = {key for at in values.values() for key in at}
-        if len(keys) == 1 and all(is_number(v) for at in values.values() for v in at.values()):
+        keys = {tuple(at) for at in values.values()}
+        is_one = len(keys) == 1 and len(next(iter(keys))) == 1
+        if is_one and all(is_number(v) for at in values.values() for v in at.values()):
             return sorted(values, key=lambda label: next(iter(values[label].values())))
         return list(values)
 

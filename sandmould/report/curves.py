@@ -23,18 +23,10 @@ from sandmould.runs.formatting import (
     value_text,
     with_margin,
 )
-from sandmould.statistics.evidence import (
-    barred,
-    error_text,
-    left_out,
-    loop_errors,
-    reason_text,
-    shown_values,
-    usable_values,
-)
+from sandmould.statistics.evidence import left_out, shown_values, usable_values
 from sandmould.statistics.settings import Setting, group_settings
 from sandmould.statistics.verdict import FEW, Verdict
-from sandmould.study.collect import Collected
+from sandmould.wording.answer import why_unused
 
 _POINTS = 12_000
 """Points of all curves of one chart; more would only make the page heavy."""
@@ -124,12 +116,12 @@ def time_chart(
         rows = rows_of[setting.label]
         tint = colour[setting.label]
         complete: list[NDArray[np.float64]] = []
-        reasons = barred(rows, measure)
+        reasons = left_out(rows, measure)
         for run, why, outcome in zip(rows[RUN], reasons, rows[OUTCOME], strict=True):
             if str(run) not in by_run:
                 continue
             xy = by_run[str(run)]
-            ended = f", {reason_text(why, outcome)}" if why else ""
+            ended = f", {why_unused(why) or outcome}" if why else ""
             lines.append(
                 Line(
                     _thinned(xy, stride),
@@ -283,18 +275,14 @@ def _run_marks(rows: pd.DataFrame, verdict: Verdict, tint: Tint) -> list[Mark]:
     factor = display_scale(verdict.measure)[0]
     marks = []
     reasons = left_out(rows, verdict.measure)
-    errors = loop_errors(rows, verdict.measure)
-    for run, why, outcome, value, error in zip(
-        rows[RUN], reasons, rows[OUTCOME], values, errors, strict=True
-    ):
+    for run, why, outcome, value in zip(rows[RUN], reasons, rows[OUTCOME], values, strict=True):
+        because = why_unused(why) or outcome
         if math.isfinite(value):
-            off = "" if error == 0.0 else f", {error_text(verdict.measure, error)}"
-            title = f"{run}: {number(value)}{off}{f', {reason_text(why, outcome)}' if why else ''}"
-            kind = "run" if not off else "doubtful"
+            title = f"{run}: {number(value)}{f', {because}' if why else ''}"
+            kind = "doubtful" if why else "run"
             marks.append(Mark(math.nan, factor * value, kind, tint, title=title))
         else:
-            title = f"{run}: {reason_text(why, outcome)}"
-            marks.append(Mark(math.nan, math.nan, "failed", tint, title=title))
+            marks.append(Mark(math.nan, math.nan, "failed", tint, title=f"{run}: {because}"))
     return marks
 
 
@@ -310,32 +298,3 @@ def _mean_mark(setting: Setting, x: float, y: float, tint: Tint, factor: float) 
 def _settings_alt(verdict: Verdict) -> str:
     parts = [f"{s.label}: {number(s.mean)}, {s.n} runs" for s in verdict.settings if s.n]
     return f"Mean {name_of(verdict.measure)} by setting. {'; '.join(parts)}."
-
-
-def best_passage(
-    collected: Collected, verdict: Verdict, measure: str
-) -> tuple[float, float, float] | None:
-    """A measure of the best setting at the start, at 3/4 and at the end of the vibration.
-
-    Returns
-    -------
-    (float, float, float) or None
-        Means over its usable runs; None where no run tells.
-    """
-    if verdict.best is None:
-        return None
-    rows = runs_of(collected.summary, verdict.best)
-    used = rows.loc[barred(rows, measure) == "", RUN]
-    curves = collected.curves
-    shaken = during_vibration(curves[curves[RUN].isin(used)])
-    passages = []
-    for _, run in shaken.groupby(RUN):
-        time_s = run[VIBRATION_TIME_S].to_numpy(dtype=np.float64)
-        value = run[measure].to_numpy(dtype=np.float64)
-        if len(time_s) > 3 and np.isfinite(value).all():
-            late = float(np.interp(0.75 * time_s[-1], time_s, value))
-            passages.append((float(value[0]), late, float(value[-1])))
-    if not passages:
-        return None
-    first, late, last = np.mean(passages, axis=0).tolist()
-    return first, late, last

@@ -4,13 +4,11 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping, Sequence
-from dataclasses import replace
 
 import numpy as np
 import pandas as pd
 
 from sandmould.runs.columns import finished
-from sandmould.runs.formatting import number
 from sandmould.scenario.drive import (
     ACCELERATION,
     DISPLACEMENT,
@@ -19,7 +17,6 @@ from sandmould.scenario.drive import (
     laid_down_drive,
 )
 from sandmould.scenario.scenario import Scenario
-from sandmould.statistics.verdict import Verdict
 
 _COLUMNS = (DISPLACEMENT, VELOCITY, ACCELERATION)
 
@@ -81,28 +78,3 @@ def drive_at(
         width = np.maximum(np.ptp(at, axis=0), np.finfo(float).tiny)
         found = values[int((((at - wanted) / width) ** 2).sum(axis=1).argmin())]
     return dict(zip(_COLUMNS, found.tolist(), strict=True))
-
-
-def with_amplitudes(verdict: Verdict, drives: Mapping[str, BoxDrive]) -> Verdict:
-    """Say in the first sentence of a verdict how the box moves at its best setting.
-
-    Parameters
-    ----------
-    verdict : Verdict
-    drives : mapping of str to BoxDrive
-        By the label of the setting.
-    """
-    if verdict.best is None or verdict.best.label not in drives:
-        return verdict
-    moves = amplitudes_text(drives[verdict.best.label].columns())
-    where = "On the table that is" if verdict.resolved else f"At {verdict.best.label} the box moves"
-    first, *others = verdict.sentences
-    return replace(verdict, sentences=(f"{first} {where} {moves}.", *others))
-
-
-def amplitudes_text(drive: Mapping[str, float]) -> str:
-    """Amplitudes as a person sets a table: ``0.15 mm to either side, 47 mm/s and 1.5 g``."""
-    return (
-        f"{number(1e3 * drive[DISPLACEMENT])} mm to either side, "
-        f"{number(1e3 * drive[VELOCITY])} mm/s and {number(drive[ACCELERATION])} g"
-    )

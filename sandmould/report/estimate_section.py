@@ -2,24 +2,22 @@
 
 from __future__ import annotations
 
-import itertools
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass
-from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pandas as pd
 
 from sandmould.definition.study import Study
 from sandmould.drawing.figure_files import pictures, strip
-from sandmould.kinds.kind import AnyScenario
+from sandmould.report.kinds.kind import Findings
 from sandmould.report.kinds.registry import report_of
 from sandmould.report.repose_figures import Heap, draw_map, draw_posterior, plotted
 from sandmould.report.tables import Cell, Column, Table
 from sandmould.runs.columns import CPU_S, RUN, total_s
 from sandmould.runs.formatting import (
-    is_number,
     listed,
     name_of,
     number,
@@ -32,12 +30,8 @@ from sandmould.statistics.calibration.sands import Calibrated, CalibratedSand
 from sandmould.statistics.emulator import TooFewRunsError, fit_emulator
 from sandmould.statistics.evidence import usable_values
 from sandmould.statistics.settings import Setting
-from sandmould.statistics.verdict import Verdict
 from sandmould.study.calibration.run import read_calibrated
-from sandmould.study.collect import Collected
-
-NOTHING = 1e-3
-"""Share of the largest value below which one is told as none."""
+from sandmould.wording.answer import detail_sentences, first_sentence
 
 
 @dataclass(frozen=True)
@@ -56,7 +50,7 @@ class EstimatePages:
 
     title: str
     headline: str
-    """Answers the study's question."""
+    """Answers the study's question where sands were to be found; empty elsewhere."""
     sentences: tuple[str, ...]
     sound: bool
     """Whether the study's question is answered."""
@@ -73,37 +67,27 @@ class EstimatePages:
         return bool(self.heaps or self.map or self.sands or self.worths)
 
 
-def estimate_pages(
-    study_folder: Path, study: Study, collected: Collected, verdict: Verdict, scenario: AnyScenario
-) -> EstimatePages | None:
-    """Draw what a study found that asks for a value, not for the best; None for other studies.
-
-    Parameters
-    ----------
-    study_folder : Path
-    study : Study
-    collected : Collected
-    verdict : Verdict
-    scenario : Scenario
-        Of any run.
-    """
+def estimate_pages(page: Findings[Any]) -> EstimatePages | None:
+    """Draw what a study found that asks for a value, not for the best; None for other studies."""
+    study_folder, study, answer, verdict = page.study_folder, page.study, page.answer, page.verdict
     if study.objective.better != "neither":
         return None
-    summary, keys = collected.of_sweep.summary, collected.keys
+    summary, keys = page.collected.of_sweep.summary, page.collected.keys
     settings = [s for s in verdict.settings if s.n]
     calibrated = read_calibrated(study_folder, study, summary, keys)
     sands = tuple(_sand(sand, calibrated) for sand in calibrated.sands) if calibrated else ()
-    sentences = [*_value_sentences(settings, verdict.measure, study), *_touching(summary)]
+    sentences = [*detail_sentences(answer), *_reported(settings, verdict.measure, study)]
+    sentences += _touching(summary)
     sentences += [sentence for sand in sands for sentence in sand.sentences[:1]]
     numeric = [k for k in keys if pd.api.types.is_numeric_dtype(summary[k])]
     is_map = len(keys) == 2 and len(numeric) == 2
     what = name_of(verdict.measure)
     return EstimatePages(
         title="Angle of repose" if verdict.measure == "heap_angle_deg" else what.capitalize(),
-        headline=_headline(settings, sands, verdict.measure, keys),
-        sentences=tuple(sentences) or (f"No run has a usable value: {what}.",),
+        headline=_headline(sands),
+        sentences=tuple(sentences) or (first_sentence(answer),),
         sound=bool(settings) and all(sand.posterior for sand in sands),
-        heaps=report_of(scenario).heaps(study_folder, summary, verdict, scenario),
+        heaps=report_of(page.scenario).heaps(study_folder, summary, verdict, page.scenario),
         map=_map_table(settings, (keys[0], keys[1])) if is_map and settings else None,
         map_picture=_map_picture(summary, keys, verdict.measure, calibrated) if is_map else "",
         sands=sands,
@@ -112,44 +96,16 @@ def estimate_pages(
     )
 
 
-def _headline(
-    settings: Sequence[Setting], sands: Sequence[SandEstimate], measure: str, keys: Sequence[str]
-) -> str:
-    """The calibrated sands, where the measure changes most, or its value."""
-    what, unit = name_of(measure), unit_of(measure)
-    unit = unit if unit in ("", "°") else f" {unit}"
-    if sands:
-        found = [sand.name for sand in sands if sand.posterior]
-        lacking = [sand.name for sand in sands if not sand.posterior]
-        said = f"Found frictions for {listed(found)}" if found else "Not resolved"
-        return f"{said}; none for {listed(lacking)}." if lacking else f"{said}."
-    if not settings:
-        return f"Not resolved: no run has a usable value: {what}."
-    largest = max(abs(s.mean) for s in settings)
-
-    def told(value: float) -> str:
-        return f"about 0{unit}" if abs(value) < NOTHING * largest else f"{number(value)}{unit}"
-
-    if len(settings) == 1:
-        (only,) = settings
-        return f"The {what} is {with_margin(only.mean, only.ci_half_width)}{unit}."
-    low, high = min(settings, key=lambda s: s.mean), max(settings, key=lambda s: s.mean)
-    said = (
-        f"The {what} goes from {told(low.mean)} ({low.label}) to {told(high.mean)} ({high.label})"
-    )
-    is_on_a_scale = len(keys) == 1 and all(is_number(s.values[keys[0]]) for s in settings)
-    if not is_on_a_scale or len(settings) < 4:
-        return f"{said}."
-    still = list(itertools.takewhile(lambda s: abs(s.mean) < NOTHING * largest, settings))
-    if still and len(still) < len(settings) - 1:
-        begins, last = settings[len(still)], settings[-1]
-        return (
-            f"The {what} is {told(0.0)} up to {still[-1].label}, {told(begins.mean)} at "
-            f"{begins.label} and {told(last.mean)} at {last.label}."
-        )
-    steps = list(itertools.pairwise(settings))
-    before, after = max(steps, key=lambda pair: abs(pair[1].mean - pair[0].mean))
-    return f"{said}; it changes most between {before.label} and {after.label}."
+def _headline(sands: Sequence[SandEstimate]) -> str:
+    """Which sands were calibrated; empty where none was to be."""
+    if not sands:
+        return ""
+    found = [sand.name for sand in sands if sand.posterior]
+    lacking = [sand.name for sand in sands if not sand.posterior]
+    if not found:
+        return f"No frictions give what was measured of {listed(lacking)}."
+    none = f"; none for {listed(lacking)}" if lacking else ""
+    return f"Found frictions for {listed(found)}{none}."
 
 
 def estimate_figures(pages: EstimatePages) -> dict[str, bytes]:
@@ -162,35 +118,20 @@ def estimate_figures(pages: EstimatePages) -> dict[str, bytes]:
     return files
 
 
-def _value_sentences(settings: Sequence[Setting], measure: str, study: Study) -> list[str]:
-    """The value at the one setting, or the range over a map; beside what was reported."""
-    if not settings:
-        return []
-    what, unit = name_of(measure), unit_of(measure)
-    unit = unit if unit in ("", "°") else f" {unit}"
-    if len(settings) > 1:
-        low, high = min(settings, key=lambda s: s.mean), max(settings, key=lambda s: s.mean)
-        return [
-            f"The {what} goes from {number(low.mean)}{unit} ({low.label}) to {number(high.mean)}"
-            f"{unit} ({high.label})."
-        ]
-    (setting,) = settings
-    rests = (
-        f"95 % interval of the mean of {setting.n} runs"
-        if setting.n > 1
-        else "one run, no interval"
-    )
-    said = [f"The {what} is {with_margin(setting.mean, setting.ci_half_width)}{unit} ({rests})."]
+def _reported(settings: Sequence[Setting], measure: str, study: Study) -> list[str]:
+    """The value of the one setting beside what was reported."""
     reported = study.objective.reported
-    if reported is not None:
-        apart = setting.mean - reported.value
-        reach = setting.ci_half_width if setting.n > 1 else math.nan
-        spread = "" if math.isnan(reach) else f" ± {number(reach, 2)}{unit}"
-        said.append(
-            f"{reported.by} reports {number(reported.value)}{unit}: the difference is "
-            f"{number(apart, 2)}{unit}{spread}."
-        )
-    return said
+    if reported is None or len(settings) != 1:
+        return []
+    (setting,) = settings
+    unit = unit_of(measure)
+    unit = unit if unit in ("", "°") else f" {unit}"
+    reach = setting.ci_half_width
+    spread = "" if math.isnan(reach) else f" ± {number(reach, 2)}{unit}"
+    return [
+        f"{reported.by} reports {number(reported.value)}{unit}: the difference is "
+        f"{number(setting.mean - reported.value, 2)}{unit}{spread}."
+    ]
 
 
 def _touching(summary: pd.DataFrame) -> list[str]:

@@ -10,21 +10,19 @@ import pandas as pd
 import scipy
 from numpy.typing import NDArray
 
-from sandmould.analysis.filling import Limb, first_reach_s, fit_limbs
+from sandmould.analysis.filling import Limb, fit_limbs
 from sandmould.definition.study import Study
 from sandmould.drawing.chart import Chart, Line, tints
-from sandmould.report.curves import are_on_a_scale, reported_lines, runs_by_setting, runs_of
-from sandmould.runs.columns import RUN, SOLID_FRACTION, VIBRATION_TIME_S, during_vibration
+from sandmould.report.curves import are_on_a_scale, reported_lines, runs_by_setting
+from sandmould.runs.columns import RUN, VIBRATION_TIME_S, during_vibration
 from sandmould.runs.formatting import name_of, number, titled, value_text, with_margin
 from sandmould.scenario.scenario import Scenario
-from sandmould.statistics.evidence import barred
+from sandmould.statistics.evidence import left_out
 from sandmould.statistics.mean_tests import CONFIDENCE
-from sandmould.statistics.settings import Setting, setting_of
+from sandmould.statistics.settings import Setting
 from sandmould.statistics.verdict import Verdict
 from sandmould.study.collect import Collected
 
-FULL_SHARE = 0.95
-"""Of the sand that a cavity holds when it is packed as the bed is."""
 SHARES = (0.125, 0.25, 0.5, 1.0)
 """Of the vibration: the times of the chart."""
 _EARLY = 1 + SHARES.index(0.25)
@@ -35,9 +33,7 @@ _EARLY = 1 + SHARES.index(0.25)
 class FillingPages:
     """What the report says of the filling of a cavity."""
 
-    advice: tuple[str, ...]
-    """The time that the best setting takes."""
-    chart: Chart | None
+    chart: Chart
     """Fill over the swept key at several times, as figure 16 of the paper."""
     limbs: str
 
@@ -64,49 +60,17 @@ def filling_pages(
         return None
     keys = collected.keys
     settings = [s for s in verdict.settings if s.n]
-    advice = (_time_to_fill(collected.summary, shaken, best, measure),)
     if not are_on_a_scale(verdict, keys) or len(settings) < 3:
-        return FillingPages(advice, None, "")
+        return None
     table = _fill_at_times(collected.summary, shaken, settings, keys[0], measure)
-    return FillingPages(
-        advice, _chart(table, study, keys[0], measure), _limbs(table, keys[0], measure)
-    )
+    return FillingPages(_chart(table, study, keys[0], measure), _limbs(table, keys[0], measure))
 
 
 def _shaken(collected: Collected, measure: str) -> pd.DataFrame:
     """Curves of usable runs during vibration."""
     summary, curves = collected.summary, collected.curves
-    used = summary.loc[barred(summary, measure) == "", RUN]
+    used = summary.loc[left_out(summary, measure) == "", RUN]
     return during_vibration(curves[curves[RUN].isin(used)])
-
-
-def _time_to_fill(summary: pd.DataFrame, shaken: pd.DataFrame, best: Setting, measure: str) -> str:
-    """When the cavity holds nearly what it holds when it is packed as the bed is."""
-    rows_of = shaken.groupby(RUN).indices
-    times_s, lasts_s, ends = [], [], []
-    for run in runs_of(summary, best)[RUN]:
-        if run not in rows_of or SOLID_FRACTION not in shaken:
-            continue
-        rows = shaken.iloc[rows_of[run]]
-        full = float(rows[SOLID_FRACTION].iloc[-1])
-        time_s = rows[VIBRATION_TIME_S].to_numpy(dtype=np.float64)
-        value = rows[measure].to_numpy(dtype=np.float64)
-        times_s.append(first_reach_s(time_s, value, FULL_SHARE * full))
-        lasts_s.append(time_s[-1])
-        ends.append(value[-1] / full)
-    what = "what fits into the cavity at the density of the bed"
-    reached = [t for t in times_s if math.isfinite(t)]
-    if not times_s:
-        return "The runs do not show how long the cavity takes to fill."
-    if len(reached) < len(times_s):
-        return (
-            f"{len(reached)} of {len(times_s)} runs at {best.label} reach "
-            f"{100 * FULL_SHARE:.0f} % of {what}. After {number(max(lasts_s))} s it holds "
-            f"{100 * float(np.mean(ends)):.0f} % of it in the mean."
-        )
-    mean = setting_of({}, len(reached), pd.Series(reached))
-    reach = with_margin(mean.mean, mean.ci_half_width)
-    return f"The sand reaches {100 * FULL_SHARE:.0f} % of {what} at {best.label} after {reach} s."
 
 
 @dataclass(frozen=True)

@@ -15,8 +15,7 @@ from sandmould.definition.study import Study
 from sandmould.drawing.chart import PLAIN, Chart, Line, tints
 from sandmould.report.bed_mode import BedMode
 from sandmould.report.curves import reported_lines
-from sandmould.report.drive import amplitudes_text, drive_at
-from sandmould.report.robustness import RobustnessPages, opening_sentences
+from sandmould.report.robustness import RobustnessPages
 from sandmould.runs.columns import CPU_S, total_s
 from sandmould.runs.formatting import (
     display_scale,
@@ -31,8 +30,9 @@ from sandmould.runs.formatting import (
 from sandmould.statistics.emulator import TooFewRunsError
 from sandmould.statistics.mean_tests import CONFIDENCE
 from sandmould.statistics.optimum import Optimum, find_optimum
-from sandmould.statistics.recommendation import Recommendation, recommend
+from sandmould.statistics.recommendation import Recommendation, Why, recommend
 from sandmould.study.rounds.round_log import RoundLog, read_rounds
+from sandmould.wording.robustness import recommendation_sentence, robustness_sentences
 
 WRONG = {"frequency_hz": 10.0}
 """By how much a key may be set wrong in a foundry; others by a tenth of their range."""
@@ -90,9 +90,6 @@ def optimum_pages(
         if optimum.interval(key)[1] - optimum.interval(key)[0] > width
     ]
     said = [_where(optimum, study, ends), *(_flat(optimum, study, key) for key in keys)]
-    drive = drive_at(summary, keys, optimum.setting)
-    if drive is not None:
-        said.insert(1, f"At this setting the box moves {amplitudes_text(drive)}.")
     if mode and (key := frequency_key(study.sweep)):
         said.insert(1, mode.beside(optimum.setting[key]))
     said += _beside(optimum, study)
@@ -101,9 +98,9 @@ def optimum_pages(
     sound = not ends and not wide
     advised = None
     if robustness is not None:
-        opening = opening_sentences(robustness, objective.measure)
+        opening = robustness_sentences(robustness.assessment)[:1]
         advised = _advised(optimum, study, robustness)
-        told = [*opening, *([advised.sentence] if advised else [])]
+        told = [*opening, *([recommendation_sentence(advised)] if advised else [])]
         is_first = robustness.assessment.is_artefact or (
             advised is not None and advised.interval_hz is None
         )
@@ -133,8 +130,8 @@ def _where(optimum: Optimum, study: Study, ends: list[str]) -> str:
         for end in [optimum.at_end(key)]
     ]
     return (
-        f"Not resolved: among what was swept the {what} is {most} at {where}, but the interval "
-        f"reaches {listed(reached)}, so the optimum may lie beyond."
+        f"Among what was swept the {what} is {most} at {where}, but the interval reaches "
+        f"{listed(reached)}, so the optimum may lie beyond."
     )
 
 
@@ -144,8 +141,7 @@ def _advised(optimum: Optimum, study: Study, robustness: RobustnessPages) -> Rec
     if robustness.mode is None or robustness.assessment.springs is None or not key:
         return None
     if optimum.at_end(key):
-        why = "the interval of the optimum reaches the end of what was swept"
-        return Recommendation(None, f"No frequency in Hz is recommended: {why}.")
+        return Recommendation(None, Why.AT_END)
     sand = study.certificate.sand_wave_speed
     return recommend(robustness.assessment, optimum.interval(key), robustness.mode.wave_speed, sand)
 

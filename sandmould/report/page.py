@@ -6,7 +6,6 @@ import contextlib
 import os
 import shutil
 from collections.abc import Iterable, Mapping
-from dataclasses import replace
 from pathlib import Path
 from typing import Any
 from urllib.parse import quote
@@ -27,16 +26,14 @@ from sandmould.kinds.kind import AnyScenario
 from sandmould.kinds.registry import kind_named
 from sandmould.report.agreement import AgreementPages, agreement_pages
 from sandmould.report.answer import (
-    Answer,
-    choices_of,
-    choices_table,
-    headline_of,
+    FirstScreen,
+    figures_of,
     optimum_choice,
     optimum_headline,
+    table_of,
 )
 from sandmould.report.bed_mode import BedMode
 from sandmould.report.curves import objective_charts
-from sandmould.report.drive import with_amplitudes
 from sandmould.report.estimate_section import EstimatePages, estimate_figures, estimate_pages
 from sandmould.report.kinds.kind import Findings, KindPages
 from sandmould.report.kinds.registry import report_of
@@ -45,13 +42,6 @@ from sandmould.report.method import (
     own_measures_method,
     provenance_rows,
     statistics_method,
-)
-from sandmould.report.next_steps import (
-    agreement_steps,
-    estimate_steps,
-    next_steps,
-    optimum_steps,
-    setting_steps,
 )
 from sandmould.report.optimum import (
     OptimumPages,
@@ -69,16 +59,33 @@ from sandmould.report.tables import (
     runs_table,
     settings_table,
 )
-from sandmould.runs.columns import RUN
+from sandmould.runs.columns import RUN, finished
 from sandmould.runs.files import replaced, write_text
 from sandmould.runs.formatting import name_of, setting_text
 from sandmould.scenario.drive import BoxDrive
+from sandmould.scenario.quantity import Section
+from sandmould.statistics.answer import Asked
+from sandmould.statistics.decision import Evidence, decide
 from sandmould.statistics.settings import setting_rows
 from sandmould.statistics.verdict import compare_settings
 from sandmould.study.collect import Collected, read_collected, read_provenance, read_study
+from sandmould.study.plan.ownership import owner_of, shipped_name
 from sandmould.study.plan.plan_files import FIGURES, SPHERES, STUDY_FILE, VERDICT_FILE, read_run
 from sandmould.study.rounds.round_log import read_rounds
+from sandmould.wording.answer import detail_sentences, first_sentence, limit_sentences
+from sandmould.wording.next_steps import (
+    agreement_steps,
+    answer_steps,
+    certificate_steps,
+    failed_steps,
+    optimum_steps,
+    sand_steps,
+    step,
+    with_file,
+)
 
+STAND_IN = "stand-in"
+"""How the source of a value begins that is not what it stands for."""
 LIMIT_BYTES = 15_000_000
 
 
@@ -127,15 +134,7 @@ def _page(study_folder: Path, home: Path, study: Study, collected: Collected) ->
     notes = report_of(any_scenario).notes(any_scenario, collected, seeks_best, is_controlled)
     if not (study_folder / STUDY_FILE).exists():
         notes = (*notes, f"{STUDY_FILE} is missing: title and objective are the defaults.")
-    verdict = compare_settings(
-        summary,
-        keys,
-        objective.measure,
-        objective.better,
-        notes,
-        seeks_best,
-        draws_by_lot=kind_named(study.kind).draws_by_lot,
-    )
+    verdict = compare_settings(summary, keys, objective.measure, objective.better)
     pictured_run = next(iter(pictured_runs(study_folder, summary, verdict).values()), "")
     listed = {setting.label for setting in listed_settings(verdict)}
     by_setting = {}
@@ -144,15 +143,39 @@ def _page(study_folder: Path, home: Path, study: Study, collected: Collected) ->
             own = _scenario_of(study_folder, summary[RUN].iloc[rows])
             if own is not None:
                 by_setting[label] = own, summary.iloc[rows]
-    if seeks_best:
-        verdict = with_amplitudes(verdict, _drives(by_setting))
-    if study.adds_replicates:
-        effort = effort_sentence(read_rounds(study_folder, study), study, summary)
-        verdict = replace(verdict, sentences=(*verdict.sentences, effort))
+    by_lot = kind_named(study.kind).draws_by_lot
+    varied = tuple(key for key in keys if summary[key].astype(str).nunique() > 1)
+    asked = Asked(objective.measure, objective.better, varied, objective.goal, by_lot)
+    drives = _drives(by_setting)
+    of_varied = {
+        setting_text({key: s.values[key] for key in varied}): drives[s.label]
+        for s in verdict.settings
+        if s.label in drives
+    }
+    stand_ins = _stand_ins(study_folder, summary[RUN], kind_named(study.kind).material)
+    answer = decide(asked, Evidence(summary, collected.of_sweep.curves, of_varied, stand_ins))
     relative = os.path.relpath(study_folder.absolute(), home)
     href = "" if relative == "." else quote(Path(relative).as_posix()) + "/"
     scenario = _scenario_of(study_folder, [pictured_run] if pictured_run else []) or any_scenario
-    return Findings(study_folder, href, study, collected, verdict, scenario, by_setting)
+    return Findings(
+        study_folder, href, study, collected, verdict, answer, scenario, by_setting, notes
+    )
+
+
+def _stand_ins(
+    study_folder: Path, runs: Iterable[str], material: type[Section] | None
+) -> tuple[str, ...]:
+    """Values of materials that are not what they stand for, by their sources in the first run."""
+    sections = tuple(f"{name}." for name in material.model_fields) if material else ()
+    for run in runs:
+        with contextlib.suppress(BadInputError, OSError):
+            sources = read_run(study_folder / "runs" / str(run) / "scenario.yaml").sources
+            return tuple(
+                key
+                for key, source in sources.items()
+                if key.startswith(sections) and source.startswith(STAND_IN)
+            )
+    return ()
 
 
 def _drives(by_setting: Mapping[str, tuple[AnyScenario, pd.DataFrame]]) -> dict[str, BoxDrive]:
@@ -177,14 +200,19 @@ def _render(
 ) -> tuple[str, dict[str, Chart | bytes], Mapping[str, str], str]:
     """The page, its figures for files, scripts beside it, and the sentence that answers."""
     of_sweep, keys, verdict = page.collected.of_sweep, page.collected.keys, page.verdict
+    answer = page.answer
     summary = page.collected.summary
     seeks_best = page.study.seeks_best
     agreement = agreement_pages(page.collected, page.study)
-    estimate = estimate_pages(page.study_folder, page.study, page.collected, verdict, page.scenario)
+    estimate = estimate_pages(page)
     kind = report_of(page.scenario)
     robustness = kind.robustness(page)
     mode = robustness.mode if robustness else kind.mode(page)
     optimum = optimum_pages(page.study_folder, page.study, of_sweep.summary, robustness, mode)
+    details = detail_sentences(answer)
+    if page.study.adds_replicates:
+        rounds = read_rounds(page.study_folder, page.study)
+        details = (*details, effort_sentence(rounds, page.study, of_sweep.summary))
     drawn, drawn_verdict = drawn_part(of_sweep, verdict)
     charts = objective_charts(drawn.summary, drawn_verdict, keys)
     if optimum and optimum.optimum and len(keys) == 1:
@@ -198,7 +226,7 @@ def _render(
             page.study.objective, of_kind.ends, kind_named(page.study.kind).draws_by_lot
         ),
     )
-    answer = _answer(page, optimum, agreement, estimate, robustness, of_kind)
+    first = _first_screen(page, optimum, agreement, estimate, robustness, of_kind)
     statement = optimum or (agreement if agreement and agreement.is_question else estimate)
     is_verdict = statement is None or (seeks_best and optimum is None)
     text = environment.get_template(of_kind.template).render(
@@ -212,8 +240,10 @@ def _render(
         estimate=estimate,
         optimum=optimum,
         robustness=robustness,
-        answer=answer,
-        statement=verdict if is_verdict else statement,
+        answer=first,
+        details=details,
+        limits=(*limit_sentences(answer), *page.notes),
+        statement=details if is_verdict or statement is None else statement.sentences,
         key_numbers=key_numbers(summary),
         objective_charts=[_both_sizes(c) for c in charts],
         drawn_note=drawn_note(of_sweep, verdict),
@@ -225,57 +255,60 @@ def _render(
         both_sizes=_both_sizes,
         multiples=small_multiples,
         half_sizes=lambda chart: (lay_out(chart, SMALL), lay_out(chart, NARROW)),
-        advice=(*of_kind.advice, *([] if optimum else _beside_mode(page, mode))),
+        advice=[] if optimum else _beside_mode(page, mode),
         warning=of_kind.warning,
         reported_best=page.study.objective.reported_best,
         **of_kind.context,
     )
     of_estimate = estimate_figures(estimate) if estimate else {}
     figures = {**numbered("objective", charts), **of_estimate, **of_kind.figures}
-    return text, figures, of_kind.beside, answer.headline
+    return text, figures, of_kind.beside, first.headline
 
 
-def _answer(
+def _first_screen(
     page: Findings[Any],
     optimum: OptimumPages | None,
     agreement: AgreementPages | None,
     estimate: EstimatePages | None,
     robustness: RobustnessPages | None,
     of_kind: KindPages,
-) -> Answer:
+) -> FirstScreen:
     """The first screen."""
-    study, collected, verdict = page.study, page.collected, page.verdict
+    study, collected, answer = page.study, page.collected, page.answer
     summary = collected.of_sweep.summary
-    drives = _drives(page.by_setting)
+    headline, is_sound = first_sentence(answer), answer.is_sound
+    steps = answer_steps(study, answer)
     figures: tuple[KeyNumber, ...] = ()
     table = None
     if optimum is not None:
         headline, is_sound = optimum_headline(
-            optimum, robustness, verdict, summary, study.certificate.sand_wave_speed is not None
+            optimum, robustness, answer, summary, study.certificate.sand_wave_speed is not None
         )
-        steps = optimum_steps(study, optimum, robustness)
-        is_artefact = robustness is not None and robustness.assessment.is_artefact
-        figures = optimum_choice(optimum, summary, verdict, is_artefact)
+        assessed = robustness.assessment if robustness else None
+        steps = optimum_steps(study, optimum.optimum, assessed)
+        is_artefact = assessed is not None and assessed.is_artefact
+        figures = optimum_choice(optimum, summary, answer.verdict, is_artefact)
     elif agreement is not None and agreement.is_question:
         headline, is_sound = agreement.sentences[0], agreement.sound
-        steps = agreement_steps(agreement)
+        steps = agreement_steps(agreement.sound)
     elif estimate is not None:
-        headline, is_sound = of_kind.answer or estimate.headline, estimate.sound
-        steps = estimate_steps(study, verdict, is_sound)
+        is_sound = is_sound and estimate.sound
+        headline = of_kind.answer or estimate.headline or headline
+        steps += sand_steps(study, is_sound)
     else:
-        headline, is_sound = headline_of(verdict, collected.keys, drives)
-        steps = setting_steps(study, verdict)
-        choices = choices_of(verdict, summary, drives)
-        figures = choices[0] if len(choices) == 1 else ()
-        table = choices_table(choices) if len(choices) > 1 else None
+        figures, table = figures_of(answer, summary), table_of(answer)
     grounds = (
-        *finished_ground(collected.summary, verdict.measure),
+        *finished_ground(answer),
         *of_kind.grounds,
         *certificate_ground(study, robustness),
     )
-    specific = (*steps, *of_kind.steps)
-    after = next_steps(page.study_folder, study, collected, verdict, is_sound, specific)
-    return Answer(headline, is_sound, figures, table, grounds, after)
+    lost = [str(run) for run in collected.summary.loc[~finished(collected.summary), RUN]]
+    steps = [*failed_steps(lost), *steps, *of_kind.steps, *certificate_steps(study, answer)]
+    if is_sound and study.seeks_best and not steps:
+        steps.append(step("try"))
+    owner = owner_of(page.study_folder)
+    after = with_file(steps, owner, shipped_name(owner), page.study_folder.name)
+    return FirstScreen(headline, is_sound, figures, table, grounds, after)
 
 
 def _write_beside(folder: Path, scripts: Mapping[str, str]) -> None:

@@ -17,16 +17,17 @@ from sandmould.drawing.chart import PLAIN, Chart, Line, tints
 from sandmould.report.bed_mode import BedMode, Response, bed_mode
 from sandmould.report.tables import Cell, Column, Table
 from sandmould.runs.columns import STAGE, TIME_S
-from sandmould.runs.formatting import name_of, number
+from sandmould.runs.formatting import number
 from sandmould.scenario.scenario import Scenario
 from sandmould.scenario.stages import StageKind, is_filling
 from sandmould.scenario.vibration import STANDARD_GRAVITY_M_S2
 from sandmould.statistics.robustness import Robustness, assess_robustness, shaken_runs
-from sandmould.statistics.spring_dependence import FOLLOWS, SpringCheck, assess_springs
+from sandmould.statistics.spring_dependence import SpringCheck, assess_springs
 from sandmould.study.collect import Collected
 from sandmould.study.plan.plan_files import read_run
 from sandmould.study.robustness.controls import SHAKE_G, cases
 from sandmould.study.rounds.round_log import read_rounds
+from sandmould.wording.robustness import robustness_sentences
 
 _LIMBS = {
     "inner": "both",
@@ -43,6 +44,7 @@ class RobustnessPages:
     """What the section shows."""
 
     assessment: Robustness
+    sentences: tuple[str, ...]
     table: Table
     spring_table: Table | None
     spectrum: Chart | None
@@ -81,6 +83,7 @@ def robustness_pages(
     mode = bed_mode(scenario, collected.of_sweep.summary, responses)
     return RobustnessPages(
         robustness,
+        robustness_sentences(robustness),
         _table(robustness, certified_hz),
         _spring_table(springs) if springs else None,
         _chart(responses) if responses else None,
@@ -208,17 +211,3 @@ def _spring_table(springs: SpringCheck) -> Table:
             )
             marked.append(not is_inner)
     return Table(columns, tuple(rows), tuple(marked))
-
-
-def follows_springs(pages: RobustnessPages | None) -> bool:
-    """Whether the best frequency goes with the hardness of the sand; not without controls."""
-    springs = pages.assessment.springs if pages is not None else None
-    return springs is not None and springs.own.dependence == FOLLOWS
-
-
-def opening_sentences(pages: RobustnessPages, measure: str) -> tuple[str, ...]:
-    """What the head of the report says of the controls."""
-    first = pages.assessment.sentences[0]
-    if pages.assessment.is_artefact:
-        return (f"{first} Do not take it for a property of the sand's {name_of(measure)}.",)
-    return (first,)

@@ -21,7 +21,7 @@ from sandmould.drawing.sphere_film import SphereFilm, sphere_frames
 from sandmould.drawing.sphere_scene import sphere_scene
 from sandmould.engines.snapshot import Snapshot
 from sandmould.kinds.sand.moments import MOMENTS, Moment, list_moments, nearest
-from sandmould.report.time_series import late_conclusion, measure_curves, whole_conclusion
+from sandmould.report.time_series import measure_curves
 from sandmould.runs.columns import (
     BED_HEIGHT_M,
     RUN,
@@ -116,13 +116,10 @@ def sand_pages(
         "film_scene": _film_scene(scenario, height_m),
         "beside": beside,
         "tubes": measure_curves(
-            collected,
-            verdict,
-            _tube_measures(collected.curves, scenario, verdict),
-            late_conclusion,
+            collected, verdict, _tube_measures(collected.curves, scenario, verdict)
         ),
         "others": measure_curves(
-            collected, verdict, _other_measures(scenario, verdict, own_measures), whole_conclusion
+            collected, verdict, _other_measures(scenario, verdict, own_measures)
         ),
     }
 

@@ -6,20 +6,18 @@ import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
-import pandas as pd
-
 from sandmould.definition.certificate import frequency_key
 from sandmould.definition.study import Study
 from sandmould.kinds.sand.narrow import narrow_spaces
 from sandmould.kinds.sand.table_motion import throws_no_sand
 from sandmould.report.robustness import RobustnessPages
-from sandmould.runs.columns import finished
 from sandmould.runs.formatting import listed, name_of, number
 from sandmould.scenario.hardness import bed_hardness
 from sandmould.scenario.scenario import Scenario
-from sandmould.statistics.evidence import loop_barred
+from sandmould.statistics.answer import Answer
 from sandmould.statistics.settings import Setting
 from sandmould.statistics.verdict import Verdict
+from sandmould.wording.answer import reasons_text
 
 
 @dataclass(frozen=True)
@@ -30,27 +28,11 @@ class Ground:
     text: str
 
 
-def finished_ground(summary: pd.DataFrame, measure: str) -> tuple[Ground, ...]:
-    """Say where runs did not finish, or where their loops do not hold.
-
-    Parameters
-    ----------
-    summary : DataFrame
-        One row a run.
-    measure : str
-        The objective.
-    """
-    lost = len(summary) - int(finished(summary).sum())
-    barred = int(loop_barred(summary, measure).sum())
-    text = f"{lost} of {len(summary)} did not finish and are not counted."
-    grounds = [Ground("Runs", text)] if lost else []
-    if barred:
-        text = (
-            f"in {barred} of {len(summary)} runs the loop between sand and pattern does not hold; "
-            "what they gave is shown and not counted."
-        )
-        grounds.append(Ground("Loop", text))
-    return tuple(grounds)
+def finished_ground(answer: Answer) -> tuple[Ground, ...]:
+    """Say which runs do not count, and why."""
+    if not answer.left_out:
+        return ()
+    return (Ground("Runs", f"{reasons_text(answer.left_out)}, of {answer.planned}: not counted."),)
 
 
 def scatter_ground(verdict: Verdict, differ_in: str, seeks_best: bool) -> tuple[Ground, ...]:
@@ -105,7 +87,7 @@ def certificate_ground(study: Study, robustness: RobustnessPages | None) -> tupl
     if not study.seeks_best or not frequency_key(study.sweep):
         return ()
     if robustness is not None:
-        return (Ground("Certificate", robustness.assessment.sentences[0]),)
+        return (Ground("Certificate", robustness.sentences[0]),)
     text = (
         "Three tests of the best frequency have not been run. They show whether it changes with "
         "the model's springs, with what the table holds constant, and with the time step."

@@ -47,15 +47,10 @@ from sandmould.runs.formatting import (
 from sandmould.runs.outcome import Outcome
 from sandmould.scenario.drive import BoxDrive
 from sandmould.statistics.agreement import sweep_part
-from sandmould.statistics.evidence import (
-    NOT_FINISHED,
-    error_text,
-    left_out,
-    loop_errors,
-    reason_text,
-)
+from sandmould.statistics.evidence import NOT_FINISHED, left_out
 from sandmould.statistics.verdict import Verdict
 from sandmould.study.plan.plan_files import CHECKS, CURVES, FIGURES, STUDY_FILE, SUMMARY
+from sandmould.wording.answer import why_unused
 
 
 @dataclass(frozen=True)
@@ -189,7 +184,7 @@ def settings_table(verdict: Verdict, drives: Mapping[str, BoxDrive]) -> Table:
         standing = "best mean" if is_best else "no run"
         if against is not None:
             difference, p = against.difference, against.p
-            standing = "too few runs"
+            standing = "not tested"
             if against.tested:
                 interval = f"{number(against.ci[0], 2)} to {number(against.ci[1], 2)}"
                 standing = "worse" if against.separated else "undecided"
@@ -284,15 +279,14 @@ def runs_table(
     rows, marked = [], []
     listed = listed_runs(summary, verdict)
     reasons = left_out(listed, verdict.measure)
-    errors = loop_errors(listed, verdict.measure)
-    for row, why, error in zip(listed.to_dict("records"), reasons, errors, strict=True):
+    for row, why in zip(listed.to_dict("records"), reasons, strict=True):
         rows.append(
             (
                 Cell(str(row[RUN]), str(row[RUN]), f"{runs_href}/{quote(str(row[RUN]))}/"),
                 *(_parameter_cell(row[k]) for k in keys),
                 *(_parameter_cell(row[b]) for b in blocks),
                 Cell(str(row[OUTCOME]), str(row[OUTCOME]), note=_why(row, why)),
-                *([_value_cell(row, verdict.measure, error)] if has_value else []),
+                *([_value_cell(row[verdict.measure])] if has_value else []),
                 *(_cost_cell(row[name], show) for name, _, show in cost),
             )
         )
@@ -302,11 +296,8 @@ def runs_table(
     return Table(columns, tuple(rows), tuple(marked), note)
 
 
-def _value_cell(row: Mapping[Any, Any], measure: str, loop_error: float) -> Cell:
-    """Value of the objective, with what its loop leaves open of it."""
-    value = _float(row[measure])
-    off = "" if loop_error == 0.0 or not math.isfinite(value) else error_text(measure, loop_error)
-    return Cell(number(value, 4), str(value), note=off.capitalize())
+def _value_cell(value: Any) -> Cell:
+    return Cell(number(_float(value), 4), str(_float(value)))
 
 
 def _parameter_cell(value: Any) -> Cell:
@@ -331,7 +322,7 @@ def _why(row: Mapping[Any, Any], why: str) -> str:
     detail = row[DETAIL] if isinstance(row[DETAIL], str) else ""
     code = _float(row[OUTCOME_CODE])
     if why != NOT_FINISHED:
-        meaning = f"{reason_text(why, '').capitalize()}." if why else ""
+        meaning = f"{why_unused(why).capitalize()}." if why else ""
     elif math.isfinite(code):
         meaning = Outcome(int(code)).meaning
     else:

@@ -1,34 +1,20 @@
-"""Measures against time, each with the sentence that concludes it."""
+"""Charts of measures against time."""
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Sequence
-from dataclasses import dataclass
+from collections.abc import Iterable, Sequence
 
 from sandmould.drawing.chart import Chart
 from sandmould.drawing.figure_files import numbered
 from sandmould.drawing.thinning import drawn_part
-from sandmould.report.curves import best_passage, time_chart
-from sandmould.runs.formatting import display_scale, name_of, number
+from sandmould.report.curves import time_chart
 from sandmould.statistics.verdict import Verdict
 from sandmould.study.collect import Collected
 
 
-@dataclass(frozen=True)
-class Curve:
-    """A chart against time with the sentence that concludes it."""
-
-    chart: Chart
-    measure: str
-    conclusion: str
-
-
 def measure_curves(
-    collected: Collected,
-    verdict: Verdict,
-    measures: Sequence[str],
-    conclude: Callable[[Collected, Verdict, str], str],
-) -> tuple[Curve, ...]:
+    collected: Collected, verdict: Verdict, measures: Sequence[str]
+) -> tuple[Chart, ...]:
     """Charts of measures against time, those that no run has left out.
 
     Parameters
@@ -37,44 +23,14 @@ def measure_curves(
     verdict : Verdict
     measures : sequence of str
         Columns of the curves.
-    conclude : callable
-        Gives the sentence of a measure.
     """
-    curves = []
     drawn, part = drawn_part(collected, verdict)
-    for measure in measures:
-        chart = time_chart(drawn.curves, drawn.summary, part, collected.keys, measure)
-        if chart is not None:
-            curves.append(Curve(chart, measure, conclude(collected, verdict, measure)))
-    return tuple(curves)
-
-
-def curve_figures(curves: Iterable[Curve]) -> dict[str, Chart]:
-    """Measures over time, as files."""
-    return numbered("curves", (curve.chart for curve in curves))
-
-
-def late_conclusion(collected: Collected, verdict: Verdict, measure: str) -> str:
-    """Whether the measure still changed at the end, at the best setting."""
-    passage = best_passage(collected, verdict, measure)
-    if verdict.best is None or passage is None or passage[1] == 0:
-        return ""
-    where, what = verdict.best.label, name_of(measure)
-    change = passage[2] / passage[1] - 1
-    if abs(change) < 0.02:
-        return f"At {where} it changed by less than 2 % in the last quarter of the vibration."
-    way = "rose" if change > 0 else "fell"
-    return (
-        f"At {where} the {what} still {way} by {100 * abs(change):.0f} % in the last quarter of "
-        "the vibration: a longer one may change the ranking."
+    every = (
+        time_chart(drawn.curves, drawn.summary, part, collected.keys, each) for each in measures
     )
+    return tuple(chart for chart in every if chart is not None)
 
 
-def whole_conclusion(collected: Collected, verdict: Verdict, measure: str) -> str:
-    """How the measure changed over the vibration, at the best setting."""
-    passage = best_passage(collected, verdict, measure)
-    if verdict.best is None or passage is None:
-        return ""
-    first, _, last = (display_scale(measure)[0] * v for v in passage)
-    way = "rose" if last > first else "fell"
-    return f"At {verdict.best.label} it {way} from {number(first)} to {number(last)}."
+def curve_figures(curves: Iterable[Chart]) -> dict[str, Chart]:
+    """Measures over time, as files."""
+    return numbered("curves", curves)

@@ -28,6 +28,7 @@ _NAMES = {
     "rolling_arm_fraction": "rolling arm",
     "solid_fraction": "solid fraction",
     "bed_height_m": "bed height",
+    "displacement_m": "amplitude",
     "drive_displacement_m": "amplitude of the box",
     "drive_velocity_m_s": "velocity of the box",
     "drive_acceleration_g": "acceleration of the box",
@@ -193,6 +194,8 @@ def range_text(key: str, low: float, high: float) -> str:
 def _display_unit(key: str, value: float) -> tuple[float, str]:
     """What a value is divided by where it is shown, and its unit then."""
     unit = unit_of(key)
+    if unit == "m" and 0.0 < abs(value) < 1.0:
+        return 1e-3, "mm"
     large = (p for p in _PREFIXES if unit in _PREFIXED and abs(value) >= p[0])
     factor, prefix = next(large, (1.0, ""))
     return factor, prefix + unit

@@ -1,8 +1,7 @@
-"""Which settings of a study agree within its margins, and how that is said."""
+"""Which settings of a study agree within its margins."""
 
 from __future__ import annotations
 
-from collections import Counter
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from itertools import combinations
@@ -20,14 +19,12 @@ from sandmould.runs.columns import (
     WALL_S,
     finished,
 )
-from sandmould.runs.formatting import listed, name_of, number, setting_text, value_text
+from sandmould.runs.formatting import listed, number, setting_text, value_text
 from sandmould.statistics.config import Equivalence
-from sandmould.statistics.equivalence import PERCENT, Agreement, agree
+from sandmould.statistics.equivalence import Agreement, agree
 from sandmould.statistics.evidence import usable_values
 from sandmould.statistics.settings import by_block, group_settings
 
-MOST_NAMED = 2
-"""Compared pairs that a sentence names; of more it counts them."""
 COLUMNS = (
     "at", "key", "first", "second", "measure", "mean_first", "mean_second", "difference",
     "ci_low", "ci_high", "margin", "n", "paired", "verdict", "note",
@@ -116,56 +113,6 @@ def compare_pair(
 def agreement_table(compared: Sequence[Compared]) -> pd.DataFrame:
     """``agreement.tsv``: one row a pair and measure."""
     return pd.DataFrame([c.row() for c in compared], columns=list(COLUMNS))
-
-
-def agreement_sentences(compared: Sequence[Compared]) -> tuple[str, ...]:
-    """Say first whether all agree, then what does not.
-
-    Parameters
-    ----------
-    compared : sequence of Compared
-        At least one.
-    """
-    by_verdict: Mapping[str, list[Compared]] = {
-        verdict: [c for c in compared if c.agreement.verdict == verdict]
-        for verdict in ("equivalent", "different", "not resolved", "not tested")
-    }
-    different, open_ = by_verdict["different"], by_verdict["not resolved"]
-    untested, total = by_verdict["not tested"], len(compared)
-    if len(by_verdict["equivalent"]) == total:
-        what = "The pair agrees" if total == 1 else f"All {total} comparisons agree"
-        return (f"{what} within the margins set beforehand, at {PERCENT}.",)
-    sentences = []
-    if different:
-        sentences.append(
-            f"They differ by more than the margin in {_named(different, compared)}, at {PERCENT}."
-        )
-    if open_:
-        first = "Not resolved" if not sentences else "Also not resolved"
-        sentences.append(
-            f"{first}, since the interval reaches over the margin: {_named(open_, compared)}."
-        )
-    if untested:
-        sentences.append(f"Not tested: {_named(untested, compared)}.")
-    agreeing = len(by_verdict["equivalent"])
-    sentences.append(f"{agreeing} of {total} comparisons agree within the margins set beforehand.")
-    return tuple(sentences)
-
-
-def _named(compared: Sequence[Compared], every: Sequence[Compared]) -> str:
-    """Measures with the pairs they were compared for; more than two pairs are counted."""
-    of = Counter(c.measure for c in every)
-    parts = []
-    for measure, count in Counter(c.measure for c in compared).items():
-        pairs = [
-            f"{c.first} – {c.second}{f' at {c.at}' if c.at else ''}"
-            for c in compared
-            if c.measure == measure
-        ]
-        few = len(compared) <= MOST_NAMED
-        said = listed(pairs) if few else f"{count} of {of[measure]} pairs"
-        parts.append(f"{name_of(measure)} ({said})")
-    return listed(parts)
 
 
 def interval_text(agreement: Agreement) -> str:

@@ -2,13 +2,28 @@
 
 from __future__ import annotations
 
+from dataclasses import dataclass
 from typing import Annotated, Literal
 
 from pydantic import Field, model_validator
 from pydantic_core import PydanticCustomError
 
+from sandmould.runs.formatting import FILL, OF_BED, filled_space
 from sandmould.scenario.quantity import NAME, Section, quantity
 from sandmould.scenario.sand import ARGUED
+
+Better = Literal["larger", "smaller", "neither"]
+FULL = "full"
+FULL_SHARE = 0.95
+"""Of what fits into a tube or cavity, as densely as the bed: from there on it is full."""
+
+
+@dataclass(frozen=True)
+class Goal:
+    """A value of a measure that is good enough."""
+
+    measure: str
+    value: float
 
 
 class Reported(Section):
@@ -27,15 +42,36 @@ class Objective(Section):
         source=ARGUED,
         pattern=NAME,
     )
-    better: Literal["larger", "smaller", "neither"] = quantity(
+    better: Better = quantity(
         "larger",
         "Which values of the measure are better; neither where it is only to be known.",
+        source=ARGUED,
+    )
+    target: Literal["full"] | float | None = quantity(
+        None,
+        "Value of the measure that is good enough; full is 95 % of what fits into a tube or "
+        "cavity. The fill of one has the target full unless another is given.",
+        unit="of the column",
         source=ARGUED,
     )
     reported: Reported | None = Field(None, description="What the measure is compared with.")
     reported_best: tuple[Reported, ...] = Field(
         (), description="Values of the one swept key that others have found best."
     )
+
+    @property
+    def is_fill(self) -> bool:
+        """Whether the measure is the fill of a tube or cavity."""
+        return self.measure.endswith((FILL, OF_BED))
+
+    @property
+    def goal(self) -> Goal | None:
+        """What is good enough; None where nothing is, or no value is better."""
+        if isinstance(self.target, float):
+            return Goal(self.measure, self.target)
+        if not self.is_fill or self.better != "larger":
+            return None
+        return Goal(filled_space(self.measure) + OF_BED, FULL_SHARE)
 
 
 class SandWaveSpeed(Section):

@@ -120,9 +120,7 @@ class Spread:
         """Mean of a setting, over all blocks alike where they count."""
         return float(self.contrasts.means[self._place(label)])
 
-    def compare(
-        self, first: str, second: str, loop_error: float = 0.0
-    ) -> tuple[float, MeanTest | None]:
+    def compare(self, first: str, second: str) -> tuple[float, MeanTest | None]:
         """Test the difference of two means, for all pairs of settings together (Tukey, Kramer).
 
         Where the two scatter more than all settings do, their own spread counts: the shared one
@@ -141,7 +139,7 @@ class Spread:
         largest = max(float(self.values[label].abs().max()) for label in (first, second))
         if not error > 1e-12 * largest:
             return difference, None
-        return difference, MeanTest(difference, error, contrasts.df, loop_error, len(self.values))
+        return difference, MeanTest(difference, error, contrasts.df, len(self.values))
 
     def _place(self, label: str) -> int:
         return list(self.values).index(label)

@@ -25,8 +25,6 @@ class MeanTest:
     """Standard error of it."""
     df: float
     """Degrees of freedom."""
-    loop_error: float = 0.0
-    """By which the difference may be off besides."""
     means: int = 2
     """How many means there are: the test holds for all their pairs together, by Tukey's
     studentized range; of two this is Student's t."""
@@ -34,7 +32,7 @@ class MeanTest:
     @property
     def pvalue(self) -> float:
         """Of both sides."""
-        beyond = max(0.0, abs(self.difference) - self.loop_error) / self.error
+        beyond = abs(self.difference) / self.error
         if self.means > 2:
             return _range_beyond(math.sqrt(2.0) * beyond, self.means, self.df)
         return 2.0 * float(scipy.special.stdtr(self.df, -beyond))
@@ -45,7 +43,7 @@ class MeanTest:
             reach = _range_reached(level, self.means, self.df) / math.sqrt(2.0)
         else:
             reach = float(scipy.special.stdtrit(self.df, 0.5 + level / 2))
-        half = reach * self.error + self.loop_error
+        half = reach * self.error
         return self.difference - half, self.difference + half
 
 

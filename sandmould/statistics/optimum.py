@@ -11,10 +11,10 @@ import numpy as np
 import pandas as pd
 from numpy.typing import NDArray
 
+from sandmould.statistics.config import Better
 from sandmould.statistics.emulator import Array, Emulator, fit_emulator
 from sandmould.statistics.evidence import usable_values
 from sandmould.statistics.mean_tests import CONFIDENCE
-from sandmould.statistics.verdict import Better
 
 DRAWS = 2000
 LOG_RATIO = 4.0

@@ -8,11 +8,11 @@ is known as well as that speed is, and from a source of the real sand alone.
 from __future__ import annotations
 
 from dataclasses import dataclass
+from enum import StrEnum
 
-from sandmould.runs.formatting import number
 from sandmould.statistics.config import SandWaveSpeed
 from sandmould.statistics.robustness import Robustness
-from sandmould.statistics.spring_dependence import FOLLOWS, STAYS, held_text
+from sandmould.statistics.spring_dependence import FOLLOWS, STAYS
 
 
 @dataclass(frozen=True)
@@ -24,12 +24,34 @@ class ModelWaveSpeed:
     """How it is known, in a few words."""
 
 
+class Why(StrEnum):
+    """What a recommendation rests on, or why none is made."""
+
+    STAYS = "stays"
+    """The optimum does not follow the springs."""
+    OF_SAND = "of sand"
+    """It does, and the interval holds the spread of the sand's wave speed."""
+    NUMERICS = "numerics"
+    """It moves with the numerics."""
+    AT_END = "at end"
+    """Its interval reaches the end of what was swept."""
+    NO_OPTIMUM = "no optimum"
+    UNRESOLVED = "unresolved"
+    NO_SOURCE = "no source"
+    """It follows the springs, and the wave speed of the real sand has no source."""
+    OTHER_SAND = "other sand"
+    """It follows the springs, and the model's wave speed is not that of the sand."""
+
+
 @dataclass(frozen=True)
 class Recommendation:
     """A frequency to set on a table, or the reason why none is named."""
 
     interval_hz: tuple[float, float] | None
-    sentence: str
+    why: Why
+    hold: str = ""
+    model: ModelWaveSpeed | None = None
+    sand: SandWaveSpeed | None = None
 
 
 def recommend(
@@ -57,43 +79,19 @@ def recommend(
     if robustness.springs is None:
         return None
     own = robustness.springs.own
-    held = held_text(own.hold)
-    if robustness.cause == "artefact of the numerics":
-        return _none("the optimum moves with the numerics")
+    if robustness.cause == "numerics artefact":
+        return Recommendation(None, Why.NUMERICS, own.hold)
     if own.dependence == STAYS:
-        return _said(interval_hz, held, "the optimum does not follow the springs")
+        return Recommendation(interval_hz, Why.STAYS, own.hold)
     if own.dependence != FOLLOWS:
-        lacking = "there is no inner optimum" if own.dependence == "none" else (
-            "whether the optimum follows the springs is not resolved"
-        )  # fmt: skip
-        return _none(f"{held} {lacking}")
+        why = Why.NO_OPTIMUM if own.dependence == "none" else Why.UNRESOLVED
+        return Recommendation(None, why, own.hold)
     if sand is None:
-        return _none(
-            "the optimum follows the springs, so it is known only as well as the wave speed of "
-            "the real sand. certificate.sand_wave_speed states no source of that speed"
-        )
-    speed = f"{number(model.speed_m_s)} m/s ({model.how})"
-    spread = f"{number(sand.low_m_s)} to {number(sand.high_m_s)} m/s ({sand.by})"
+        return Recommendation(None, Why.NO_SOURCE, own.hold)
     if not sand.low_m_s <= model.speed_m_s <= sand.high_m_s:
-        return _none(
-            f"the optimum follows the springs, and the model's wave speed, {speed}, is not that of "
-            f"the sand, {spread}"
-        )
+        return Recommendation(None, Why.OTHER_SAND, own.hold, model, sand)
     low_hz, high_hz = interval_hz
     wide_hz = (
         low_hz * sand.low_m_s / model.speed_m_s, high_hz * sand.high_m_s / model.speed_m_s
     )  # fmt: skip
-    return _said(
-        wide_hz, held,
-        f"the optimum follows the springs, so the interval holds the spread of the sand's wave "
-        f"speed, {spread}; the model's is {speed}",
-    )  # fmt: skip
-
-
-def _none(why: str) -> Recommendation:
-    return Recommendation(None, f"No frequency in Hz is recommended: {why}.")
-
-
-def _said(interval_hz: tuple[float, float], held: str, why: str) -> Recommendation:
-    low, high = (number(f) for f in interval_hz)
-    return Recommendation(interval_hz, f"Recommended {held}: {low} to {high} Hz; {why}.")
+    return Recommendation(wide_hz, Why.OF_SAND, own.hold, model, sand)

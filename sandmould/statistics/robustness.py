@@ -11,7 +11,6 @@ import pandas as pd
 import scipy
 
 from sandmould.runs.columns import PART, RUN, SWEEP, finished
-from sandmould.runs.formatting import listed, number
 from sandmould.statistics.config import Objective
 from sandmould.statistics.control_case import SPRINGS, ControlCase
 from sandmould.statistics.evidence import usable_values
@@ -20,11 +19,12 @@ from sandmould.statistics.spring_dependence import FOLLOWS, SHARE, STAYS, Spring
 
 ShiftVerdict = Literal["up", "down", "held", "unclear", "no result"]
 Cause = Literal[
-    "rearrangement of grains", "follows the springs", "resonance of the bed", "no inner optimum",
-    "artefact of what is held constant", "artefact of the numerics", "unresolved",
+    "rearrangement of grains", "follows the springs", "bed resonance", "no inner optimum",
+    "held artefact", "numerics artefact", "unresolved",
 ]  # fmt: skip
 MUST_HOLD = ("hold", "time_step", "engine")
 """Controls that, with the springs, move nothing where the optimum belongs to the grains."""
+NUMERICS = ("time_step", "engine")
 _SPECTRUM = "spectrum"
 
 
@@ -58,7 +58,9 @@ class Robustness:
     """What the controls of an optimum say together."""
 
     cause: Cause
-    sentences: tuple[str, ...]
+    best_hz: float
+    lacking: tuple[str, ...]
+    """Controls that the cause needs and that were not asked for."""
     sweep: tuple[float, ...]
     """Means of the sweep's own runs at the three frequencies."""
     shifts: tuple[OptimumShift, ...]
@@ -69,7 +71,26 @@ class Robustness:
     @property
     def is_artefact(self) -> bool:
         """Whether the optimum is none of the sand's, or none at all."""
-        return self.cause.startswith("artefact") or self.cause == "no inner optimum"
+        return self.cause.endswith("artefact") or self.cause == "no inner optimum"
+
+    @property
+    def moved(self) -> tuple[OptimumShift, ...]:
+        """Cases that move it."""
+        return tuple(m for m in self.shifts if m.verdict in ("up", "down"))
+
+    def moved_by(self, *controls: str) -> tuple[OptimumShift, ...]:
+        """Cases of some controls that move it."""
+        return tuple(m for m in self.moved if m.case.control in controls)
+
+    @property
+    def untold(self) -> tuple[OptimumShift, ...]:
+        """Cases that do not tell whether they move it."""
+        return tuple(m for m in self.shifts if m.verdict in ("unclear", "no result"))
+
+    @property
+    def follows_springs(self) -> bool:
+        """Whether the best frequency goes with the hardness of the sand."""
+        return self.springs is not None and self.springs.own.dependence == FOLLOWS
 
     @property
     def is_sound(self) -> bool:
@@ -140,9 +161,9 @@ def assess_robustness(
             verdict = _of_interval(ci, margin)
         means = tuple(sign * mean.get((part, f), math.nan) for f in certified_hz)
         shifts.append(OptimumShift(by_part[part], means, shift, ci, verdict))
-    cause, sentences = _together(shifts, springs, certified_hz[1])
+    cause, lacking = _together(shifts, springs)
     of_sweep = tuple(sign * v for v in sweep)
-    return Robustness(cause, sentences, of_sweep, tuple(shifts), margin, springs)
+    return Robustness(cause, certified_hz[1], lacking, of_sweep, tuple(shifts), margin, springs)
 
 
 def _without_interval(shift: float) -> ShiftVerdict:
@@ -163,66 +184,27 @@ def _of_interval(ci: tuple[float, float], margin: float) -> ShiftVerdict:
 
 
 def _together(
-    shifts: Sequence[OptimumShift], springs: SpringCheck | None, best_hz: float
+    shifts: Sequence[OptimumShift], springs: SpringCheck | None
 ) -> tuple[Cause, tuple[str, ...]]:
-    """The verdict, and the reasons for it."""
-    at = f"The optimum at {number(best_hz)} Hz"
+    """What the optimum belongs to, and which controls that were not asked would say."""
     moved = [m for m in shifts if m.verdict in ("up", "down")]
-    open_ = [m for m in shifts if m.verdict in ("unclear", "no result")]
-    said = [f"{_listed(moved)}."] if moved else []
-    said += [f"Not told: {listed([m.name for m in open_])}."] if open_ else []
-    said += [hold.sentence for hold in springs.holds] if springs else []
     own = springs.own if springs else None
-    numerics = [m for m in moved if m.case.control in ("time_step", "engine")]
-    as_column = [m for m in moved if m.follows_depth]
-    held = [m for m in moved if m.case.control == "hold"]
-    if numerics:
-        first = f"{at} is an artefact of the numerics: it moves with {_names(numerics)}."
-        return "artefact of the numerics", (first, *said)
+    if any(m.case.control in NUMERICS for m in moved):
+        return "numerics artefact", ()
     if own and own.dependence == "none":
-        first = (
-            f"{at} is no inner optimum of the sand: with softer or stiffer springs there is none."
-        )
-        return "no inner optimum", (first, *said)
-    if own and own.dependence == FOLLOWS and as_column:
-        first = (
-            f"{at} is a resonance of the bed: it moves with the springs and with "
-            f"{_names(as_column)} as c/(4 H) does. So it holds for sand as hard as the model's."
-        )
-        return "resonance of the bed", (first, *said)
+        return "no inner optimum", ()
     if own and own.dependence == FOLLOWS:
-        first = f"{at} follows the springs, so it holds for sand as hard as the model's."
-        return "follows the springs", (first, *said)
-    if held:
-        first = f"{at} is an artefact of what is held constant: it moves with {_names(held)}."
-        return "artefact of what is held constant", (first, *said)
+        is_column = any(m.follows_depth for m in moved)
+        return "bed resonance" if is_column else "follows the springs", ()
+    if any(m.case.control == "hold" for m in moved):
+        return "held artefact", ()
     wanted = [m for m in shifts if m.case.control in MUST_HOLD]
-    missing = [c.replace("_", " ") for c in MUST_HOLD
-               if c not in {m.case.control for m in wanted}]  # fmt: skip
-    missing += [] if own else [SPRINGS]
+    asked = {m.case.control for m in wanted} | ({SPRINGS} if own else set())
+    lacking = tuple(c for c in (*MUST_HOLD, SPRINGS) if c not in asked)
     stays = own is not None and own.dependence == STAYS
-    if not missing and stays and all(m.verdict == "held" for m in wanted):
-        first = (
-            f"{at} belongs to the sand: it does not follow the springs. Neither what is held "
-            "constant nor time step or engine moves it by more than the margin."
-        )
-        return "rearrangement of grains", (first, *said)
-    why = [f"{m.name} {'moves it' if m in moved else 'does not tell'}" for m in wanted
-           if m.verdict != "held"]  # fmt: skip
-    why += ["the springs do not tell"] if own and not stays else []
-    why += [f"{c} was not asked" for c in missing]
-    first = f"Whether the optimum at {number(best_hz)} Hz belongs to the sand is unresolved: "
-    return "unresolved", (f"{first}{listed(why)}.", *said)
-
-
-def _names(shifts: Sequence[OptimumShift]) -> str:
-    return listed([m.name for m in shifts])
-
-
-def _listed(shifts: Sequence[OptimumShift]) -> str:
-    up, down = ([m for m in shifts if m.verdict == way] for way in ("up", "down"))
-    said = [f"{way} with {_names(some)}" for way, some in (("up", up), ("down", down)) if some]
-    return f"It moves {' and '.join(said)}"
+    if not lacking and stays and all(m.verdict == "held" for m in wanted):
+        return "rearrangement of grains", ()
+    return "unresolved", lacking
 
 
 def shaken_runs(summary: pd.DataFrame, cases: Sequence[ControlCase]) -> list[str]:

@@ -31,10 +31,7 @@ class Setting:
     sd: float
     """Standard deviation over replicates; NaN for fewer than two."""
     ci_half_width: float
-    """Half width of the 95 % interval of this mean alone, with the error of the loops; NaN for
-    fewer than two."""
-    loop_error: float = 0.0
-    """Mean over the runs of what their loops leave open of the value."""
+    """Half width of the 95 % interval of this mean alone; NaN for fewer than two."""
 
 
 @dataclass(frozen=True)
@@ -45,8 +42,6 @@ class Comparison:
     difference: float
     test: MeanTest | None
     """None where replicates are too few or identical."""
-    loop_error: float = 0.0
-    """What loops leave open of the difference; a part of the interval that no more runs narrow."""
 
     @property
     def ci(self) -> tuple[float, float]:
@@ -92,9 +87,7 @@ def group_settings(
     return [(values, summary.iloc[rows]) for values, rows in setting_rows(summary, keys)]
 
 
-def setting_of(
-    values: dict[str, Any], planned: int, measured: pd.Series[float], loop_error: float = 0.0
-) -> Setting:
+def setting_of(values: dict[str, Any], planned: int, measured: pd.Series[float]) -> Setting:
     """Mean, spread and interval of one setting's finished values."""
     n = len(measured)
     sd = float(measured.std(ddof=1)) if n > 1 else math.nan
@@ -104,9 +97,7 @@ def setting_of(
         else sd
     )
     mean = float(measured.mean()) if n else math.nan
-    return Setting(
-        values, setting_text(values), planned, n, mean, sd, half + loop_error, loop_error
-    )
+    return Setting(values, setting_text(values), planned, n, mean, sd, half)
 
 
 def number_blocks(summary: pd.DataFrame) -> NDArray[np.intp]:
@@ -138,9 +129,6 @@ def compare(best: Setting, others: Sequence[Setting], spread: Spread) -> tuple[C
     spread : Spread
         Of all settings, by which they are compared.
     """
-    comparisons = []
-    for other in others:
-        loop_error = best.loop_error + other.loop_error
-        difference, test = spread.compare(best.label, other.label, loop_error)
-        comparisons.append(Comparison(other.label, difference, test, loop_error))
-    return tuple(comparisons)
+    return tuple(
+        Comparison(other.label, *spread.compare(best.label, other.label)) for other in others
+    )

@@ -8,7 +8,7 @@ range that is better than both of its ends.
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Literal
 
@@ -18,7 +18,6 @@ import scipy
 from numpy.typing import NDArray
 
 from sandmould.runs.columns import PART, SWEEP
-from sandmould.runs.formatting import listed, number
 from sandmould.statistics.config import Objective, fewest_points
 from sandmould.statistics.contrasts import Contrasts
 from sandmould.statistics.control_case import SPRINGS, ControlCase
@@ -29,23 +28,13 @@ from sandmould.statistics.settings import number_blocks
 
 Array = NDArray[np.float64]
 Shape = Literal["inner", "rising", "falling", "open", "no result"]
-Dependence = Literal[
-    "inner optimum that follows the springs", "inner optimum that does not follow the springs",
-    "none", "unresolved",
-]  # fmt: skip
-FOLLOWS: Dependence = "inner optimum that follows the springs"
-STAYS: Dependence = "inner optimum that does not follow the springs"
+Dependence = Literal["follows", "stays", "none", "unresolved"]
+FOLLOWS: Dependence = "follows"
+STAYS: Dependence = "stays"
 SHARE = 0.05
 """Of the measure at the optimum, the margin where the study sets none."""
 BLIND = 2.0
 """Margins: runs that cannot tell a drop of so many say nothing of an optimum that they miss."""
-_FOLLOWING = {FOLLOWS: "it follows the springs", STAYS: "it does not follow the springs"}
-_SHAPES: dict[Shape, str] = {
-    "rising": "no frequency is better than the highest one",
-    "falling": "no frequency is better than the lowest one",
-    "open": "no frequency is better than both ends",
-    "no result": "too few runs can be used",
-}
 
 
 @dataclass(frozen=True)
@@ -95,7 +84,13 @@ class HoldVerdict:
     """Frequency of the optimum with the stiffest springs over that with the softest; NaN where
     either has none."""
     ci: tuple[float, float]
-    sentence: str
+    lacking: tuple[SpringCurve, ...] = ()
+    """Curves that have no optimum inside, or do not tell whether they have one."""
+
+    @property
+    def root(self) -> float:
+        """What the ratio is where the optimum follows the springs."""
+        return math.sqrt(self.curves[-1].factor / self.curves[0].factor)
 
 
 @dataclass(frozen=True)
@@ -270,10 +265,9 @@ def _judge(hold: str, curves: Sequence[SpringCurve], blind: float) -> HoldVerdic
     if without := [curve for curve in curves if curve.limbs.shape != "inner"]:
         told = [curve for curve in without if curve.limbs.seen <= blind]
         dependence: Dependence = "none" if told else "unresolved"
-        what = "there is no inner optimum" if told else "nothing can be told"
-        said = f"{held_text(hold).capitalize()} {what}: {'; '.join(_lacking(told or without))}."
         unknown = (math.nan, math.nan)
-        return HoldVerdict(hold, dependence, tuple(curves), math.nan, unknown, said)
+        lacking = tuple(told or without)
+        return HoldVerdict(hold, dependence, tuple(curves), math.nan, unknown, lacking)
     soft, stiff = curves[0], curves[-1]
     logs = _drawn(stiff) - _drawn(soft)
     ends = np.exp(np.quantile(logs, (0.5 - CONFIDENCE / 2, 0.5 + CONFIDENCE / 2)))
@@ -283,35 +277,10 @@ def _judge(hold: str, curves: Sequence[SpringCurve], blind: float) -> HoldVerdic
     border = math.sqrt(root)
     follows, stays = low > border, high < border and low > 1.0 / border
     verdict = FOLLOWS if follows else STAYS if stays else "unresolved"
-    so = _FOLLOWING.get(verdict, "whether it follows them is not resolved")
-    said = (
-        f"{held_text(hold).capitalize()} the optimum goes from {_at(soft)} to {_at(stiff)}, "
-        f"{number(ratio, 2)} times ({number(low, 2)} to {number(high, 2)}) as high: {so}, whose "
-        f"root is {number(root, 2)} times as large."
-    )
-    return HoldVerdict(hold, verdict, tuple(curves), ratio, (low, high), said)
-
-
-def _lacking(curves: Sequence[SpringCurve]) -> Iterator[str]:
-    """Why curves have no optimum inside, those that lack it for one reason together."""
-    for shape in dict.fromkeys(curve.limbs.shape for curve in curves):
-        some = [curve for curve in curves if curve.limbs.shape == shape]
-        said = f"{_SHAPES[shape]} with springs {listed([f'x{c.factor:g}' for c in some])}"
-        seen = [c.limbs.seen for c in some if math.isfinite(c.limbs.seen)]
-        yield f"{said} (a drop below {number(max(seen), 2)} is not told)" if seen else said
-
-
-def held_text(hold: str) -> str:
-    """Say what a study holds."""
-    return f"with the {'moment of the ' if hold == 'unbalance' else ''}{hold} held"
+    return HoldVerdict(hold, verdict, tuple(curves), ratio, (low, high))
 
 
 def _drawn(curve: SpringCurve) -> Array:
     """Logarithms of the frequencies at which drawn curves are best, (n,) float64."""
-    assert curve.optimum is not None, "an inner optimum has been located"
+    assert curve.optimum is not None
     return np.log(curve.optimum.points[curve.optimum.picks, 0])
-
-
-def _at(curve: SpringCurve) -> str:
-    best, low, high = (number(f) for f in curve.place_hz)
-    return f"{best} Hz ({low} to {high}) with springs x{curve.factor:g}"

@@ -10,6 +10,7 @@ from pathlib import Path
 import pandas as pd
 
 from sandmould.definition.study import Study
+from sandmould.kinds.registry import kind_named
 from sandmould.plain_file import UNREADABLE
 from sandmould.runs.columns import RUN
 from sandmould.runs.formatting import name_of, number
@@ -110,17 +111,19 @@ def so_far_text(summary: pd.DataFrame, study: Study, settings: int) -> str:
         return f"{what} {between} by {_runs(runs)}"
     if len(used) == 1:
         return f"{what} {_mean(verdict.best)}; nothing to compare with yet"
-    return _best(verdict, what, verdict.resolved and len(used) == settings)
+    if not kind_named(study.kind).draws_by_lot:
+        return _best(verdict, what)
+    resolved = verdict.resolved and len(used) == settings
+    return f"{'resolved' if resolved else 'not resolved yet'}, {_best(verdict, what)}"
 
 
-def _best(verdict: Verdict, what: str, resolved: bool) -> str:
+def _best(verdict: Verdict, what: str) -> str:
     best, second = verdict.best, verdict.runner_up
     assert best is not None
     assert second is not None
     where = f"{best.label} {_mean(best)}"
     most = "highest" if verdict.better == "larger" else "lowest"
-    end = "resolved" if resolved else "not resolved yet"
-    return f"{end}, {most} {what} at {where}, then {second.label} {_mean(second)}"
+    return f"{most} {what} at {where}, then {second.label} {_mean(second)}"
 
 
 def _mean(setting: Setting) -> str:

@@ -6,7 +6,7 @@ from sandmould.kinds.deck.own.computation import WENT_ON
 from sandmould.report.kinds.kind import Findings, KindPages, KindReport
 from sandmould.report.method import deck_method
 from sandmould.report.sureness import scatter_ground
-from sandmould.report.time_series import curve_figures, measure_curves, whole_conclusion
+from sandmould.report.time_series import curve_figures, measure_curves
 from sandmould.runs.columns import DETAIL
 from sandmould.scenario.own_deck import OwnDeck
 from sandmould.study.collect import Collected
@@ -27,7 +27,7 @@ def _pages(findings: Findings[OwnDeck], film_budget_bytes: int) -> KindPages:
     scenario, collected = findings.scenario, findings.collected
     # the objective first
     measures = dict.fromkeys([findings.verdict.measure, *scenario.measures])
-    curves = measure_curves(collected.of_sweep, findings.verdict, list(measures), whole_conclusion)
+    curves = measure_curves(collected.of_sweep, findings.verdict, list(measures))
     return KindPages(
         "deck.html",
         deck_method(scenario, collected.keys, collected.summary),

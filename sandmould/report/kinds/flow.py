@@ -34,7 +34,6 @@ from sandmould.report.flow_charts import (
 )
 from sandmould.report.kinds.kind import Findings, KindPages, KindReport
 from sandmould.report.method import Row
-from sandmould.report.next_steps import NextStep
 from sandmould.report.sureness import Ground
 from sandmould.report.tables import Cell, Column, Table
 from sandmould.report.time_series import measure_curves
@@ -42,6 +41,7 @@ from sandmould.runs.columns import CLASSIFICATION, DETAIL, HOPS, OUTCOME_CODE, R
 from sandmould.runs.formatting import listed, name_of, number, setting_text
 from sandmould.scenario.casting.flow import MetalFlow, PouredMetal, StillTank
 from sandmould.study.collect import Collected
+from sandmould.wording.next_steps import NextStep
 
 PICTURED_RUNS = 6
 """Runs whose histories and fields are drawn."""
@@ -104,7 +104,7 @@ def _pages(findings: Findings[MetalFlow], film_budget_bytes: int) -> KindPages:
         "fields": fields,
         "films": films,
         "colours": COLOURS,
-        "curves": measure_curves(collected, findings.verdict, measures, lambda *_: ""),
+        "curves": measure_curves(collected, findings.verdict, measures),
         "pours": not isinstance(scenario.case, StillTank),
     }
     return KindPages(
@@ -183,7 +183,7 @@ def _sentences(
 def _calm(scenario: MetalFlow, ranked: pd.DataFrame, keys: Sequence[str]) -> str:
     """At which settings the pressure stays calm, the calmest first."""
     if ranked.empty:
-        return "Not resolved: no run finished."
+        return "No run finished, so there is no answer."
     labels = [setting_text({key: row[key] for key in keys}) for _, row in ranked.iterrows()]
     verdicts = list(ranked[CLASSIFICATION])
     # the calmest come first
@@ -218,7 +218,7 @@ def _grounds(scenario: MetalFlow) -> tuple[Ground, ...]:
             f"the pressure at {name} deviates by less than {QUIET_PA:g} Pa (standard "
             "deviation), and no metal hops.",
         ),
-        Ground("Chance", "nothing in these runs is left to it: one run of each setting is enough."),
+        Ground("Chance", "nothing in these runs is random: no repeats are needed."),
         Ground(
             "Method",
             "the gradient as the paper prints it makes every run fail; another one, "

@@ -14,13 +14,14 @@ from sandmould.drawing.chart import Chart
 from sandmould.kinds.kind import ScenarioT
 from sandmould.report.bed_mode import BedMode
 from sandmould.report.method import Row
-from sandmould.report.next_steps import NextStep
 from sandmould.report.repose_figures import Heap
 from sandmould.report.robustness import RobustnessPages
 from sandmould.report.sureness import Ground
 from sandmould.scenario.drive import BoxDrive
+from sandmould.statistics.answer import Answer
 from sandmould.statistics.verdict import Verdict
 from sandmould.study.collect import Collected
+from sandmould.wording.next_steps import NextStep
 
 
 @dataclass(frozen=True)
@@ -38,8 +39,6 @@ class KindPages:
     """What is written as files too, by name."""
     beside: Mapping[str, str] = field(default_factory=dict)
     """Scripts for the folder ``SPHERES`` beside the page, by file name."""
-    advice: tuple[str, ...] = ()
-    """What follows the verdict."""
     answer: str = ""
     """Answers the title's question in one sentence; empty where the objective does."""
     grounds: tuple[Ground, ...] = ()
@@ -60,10 +59,14 @@ class Findings(Generic[ScenarioT]):
     study: Study
     collected: Collected
     verdict: Verdict
+    """All settings, compared."""
+    answer: Answer
     scenario: ScenarioT
     """Of the run that is shown."""
     by_setting: Mapping[str, tuple[ScenarioT, pd.DataFrame]]
     """Scenario and rows of the summary of the settings that are listed, by label."""
+    notes: tuple[str, ...]
+    """What the simulation leaves open."""
 
     @property
     def scenarios(self) -> Mapping[str, ScenarioT]:

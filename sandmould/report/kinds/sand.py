@@ -24,8 +24,8 @@ from sandmould.runs.columns import LEAST_LIMIT_S, OVERLAP_P99_FRACTION, TIME_STE
 from sandmould.runs.formatting import number
 from sandmould.scenario.hardness import bed_hardness
 from sandmould.scenario.scenario import Scenario
-from sandmould.statistics.verdict import sand_notes
 from sandmould.study.collect import Collected
+from sandmould.wording.answer import sand_limits
 
 
 def _notes(
@@ -33,7 +33,7 @@ def _notes(
 ) -> tuple[str, ...]:
     """Steps that were too long, and what the drive and its controls leave open."""
     stage = scenario.vibrations[0] if scenario.vibrations else None
-    notes = sand_notes(collected.keys, stage, seeks_best, is_controlled)
+    notes = sand_limits(collected.keys, stage, seeks_best and not is_controlled)
     return (*_steps_above_limit(collected.summary), *notes)
 
 
@@ -67,7 +67,6 @@ def _pages(findings: Findings[Scenario], film_budget_bytes: int) -> KindPages:
         },
         _sand_figures(pages, filling, bending, loose is not None),
         pages["beside"],
-        advice=filling.advice if filling else (),
         grounds=(
             *sand_grounds(scenario, study, verdict),
             *weak_ground(findings.scenarios),
@@ -112,7 +111,7 @@ def _sand_figures(
         files["sand"] = strip([(panel["heading"], panel["by_layer"]) for panel in panels])
     if panels and has_loose:
         files["density"] = strip([(panel["heading"], panel["by_density"]) for panel in panels])
-    if filling and filling.chart:
+    if filling:
         files["filling"] = filling.chart
     if bending:
         files |= pictures(pattern=bending["outlines"])

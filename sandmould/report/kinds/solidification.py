@@ -23,16 +23,18 @@ from sandmould.drawing.figures import png
 from sandmould.kinds.solidification.kind import SolidificationStudy
 from sandmould.report.kinds.kind import Findings, KindPages, KindReport
 from sandmould.report.method import Row
-from sandmould.report.next_steps import NextStep
 from sandmould.report.sureness import Ground
 from sandmould.report.tables import Cell, Column, Table
 from sandmould.report.time_series import curve_figures, measure_curves
 from sandmould.runs.columns import CPU_S, RUN, SOLIDIFICATION_TIME_S, TIME_S, finished
 from sandmould.runs.formatting import is_number, listed, name_of, number, seconds, setting_text
 from sandmould.scenario.casting.solidification import MouldMaterial, Solidification
-from sandmould.statistics.verdict import Verdict, rank_runs
+from sandmould.statistics.answer import Answer
+from sandmould.statistics.refining import resolution_among
+from sandmould.statistics.verdict import rank_runs
 from sandmould.study.collect import Collected
 from sandmould.study.plan.plan_files import read_run
+from sandmould.wording.next_steps import NextStep
 
 NEAR_PERCENT = 5.0
 """Off the reference's solidification time: as near as the answer takes for good."""
@@ -65,16 +67,15 @@ def _pages(findings: Findings[Solidification], film_budget_bytes: int) -> KindPa
     collected, keys = findings.collected.of_sweep, findings.collected.keys
     # A study whose file is missing is read as one of sand.
     reference = study.reference if isinstance(study, SolidificationStudy) else {}
-    best = _run_of(collected.summary, verdict) if study.seeks_best else ""
+    best = _run_of(collected.summary, findings.answer) if study.seeks_best or not reference else ""
     run = _pictured_run(reference, collected, best)
     folder = findings.study_folder / "runs" / run
     probes = [f"{probe.name}_k" for probe in scenario.probes]
-    curves = measure_curves(collected, verdict, [*probes, "solidified_fraction"], lambda *_: "")
+    curves = measure_curves(collected, verdict, [*probes, "solidified_fraction"])
     fields, sentences, spots = _fields(folder, scenario)
     errors = _errors(reference, scenario, collected) if reference else []
     error_cost = _error_charts(errors)
     stand_ins = _stand_ins(folder / "scenario.yaml")
-    answer = _cheapest(errors, reference, collected) or sentences[0]
     shown = {
         "pictured_run": run,
         "fields": fields,
@@ -94,9 +95,9 @@ def _pages(findings: Findings[Solidification], film_budget_bytes: int) -> KindPa
             **numbered("error_cost", error_cost),
             **curve_figures(curves),
         },
-        answer="" if study.seeks_best else answer,
+        answer="" if study.seeks_best else _cheapest(errors, reference, collected),
         grounds=_grounds(bool(stand_ins), scenario),
-        steps=_steps(scenario, bool(reference)),
+        steps=() if resolution_among(keys) and not reference else _steps(scenario, bool(reference)),
     )
 
 
@@ -109,9 +110,12 @@ def _steps(scenario: Solidification, has_reference: bool) -> tuple[NextStep, ...
     return (NextStep("See whether the result stays with elements half as large:", finer),)
 
 
-def _run_of(summary: pd.DataFrame, verdict: Verdict) -> str:
-    """The best run of the objective; empty where none finished."""
-    return rank_runs(summary, verdict.measure, verdict.better).get("best", "")
+def _run_of(summary: pd.DataFrame, answer: Answer) -> str:
+    """The finest run, or else the best of the objective; empty where none finished."""
+    if answer.refining is not None:
+        done = summary[finished(summary)]
+        return str(done.sort_values(answer.refining.key)[RUN].iloc[0])
+    return rank_runs(summary, answer.asked.measure, answer.asked.better).get("best", "")
 
 
 def _stand_ins(path: Path) -> tuple[str, ...]:
@@ -121,21 +125,21 @@ def _stand_ins(path: Path) -> tuple[str, ...]:
     if not keys:
         return ()
     names = [f"{key.rpartition('.')[0].replace('.', ' ')} {name_of(key)}" for key in keys]
-    return (f"Stand-ins by their sources, so that times are those of no real casting: "
+    return (f"Placeholder values, so do not use these times for your alloy: "
             f"{listed(names, most=20)}.",)  # fmt: skip
 
 
 def _grounds(has_stand_ins: bool, scenario: Solidification) -> tuple[Ground, ...]:
     """What the answer rests on."""
     values = (
-        "some are stand-ins, so that the times are those of no real casting."
+        "some are placeholders: do not use these times for your alloy."
         if has_stand_ins
         else "those of the study's sources."
     )
     flat = "two dimensions: heat that leaves across the plane is not counted."
     return (
         Ground("Material values", values),
-        Ground("Chance", "nothing in these runs is left to it: one run of each setting is enough."),
+        Ground("Chance", "nothing in these runs is random: no repeats are needed."),
         *([Ground("Shape", flat)] if scenario.dimensions == 2 else []),
     )
 
@@ -177,7 +181,7 @@ def _fields(folder: Path, scenario: Solidification) -> tuple[str, tuple[str, ...
             for axis, place_m in zip("xyz", frozen.last_point_m, strict=False)
         )
         said = (
-            f"The casting is solid after {number(frozen.solidification_time_s, 4)} s; the last "
+            f"The casting is solid after {number(frozen.solidification_time_s)} s; the last "
             f"point to freeze lies at {at}."
         )
     axes = [Column(f"{name}, mm") for name in "yz"[: scenario.dimensions - 1]]

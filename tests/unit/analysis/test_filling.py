@@ -7,7 +7,7 @@ import math
 import numpy as np
 import pytest
 
-from sandmould.analysis.filling import first_reach_s, fit_limbs
+from sandmould.analysis.filling import fit_limbs
 
 F_HZ = np.array([10.0, 20.0, 40.0, 80.0, 160.0])
 
@@ -43,9 +43,3 @@ def test_order_of_points_and_lost_ones_do_not_matter() -> None:
     assert (some.points, some.exponent) == (4, pytest.approx(-0.7))
     with pytest.raises(ValueError, match="positive"):
         fit_limbs(F_HZ, -y, y)
-
-
-def test_a_level_is_reached_between_records() -> None:
-    assert first_reach_s([0, 1, 2, 3], [0, 0.4, 0.8, 0.7], 0.6) == pytest.approx(1.5)
-    assert first_reach_s([0, 1], [0.7, 0.8], 0.6) == 0
-    assert math.isnan(first_reach_s([0, 1, 2], [0, 0.4, 0.5], 0.6))

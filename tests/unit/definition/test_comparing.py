@@ -16,6 +16,7 @@ from sandmould.bad_input import BadInputError
 from sandmould.definition.run import Run
 from sandmould.engines.program import build_program
 from sandmould.scenario.engine import ENGINE_NAMES
+from sandmould.statistics.config import Goal, Objective
 from sandmould.study.plan.build_plan import Plan, open_plan
 from sandmould.study.plan.expand import expand
 from sandmould.study.plan.load_study import open_study
@@ -241,3 +242,34 @@ def test_deck_is_made_from_its_own_dialect_and_solver(planned: Planned) -> None:
     assert any(path.endswith("templates/lammps/deck.in.j2") for path in lammps)
     assert not any("/dem/" in path for path in lammps)
     assert any(path.endswith("sandmould/dem/contact_law.py") for path in reference)
+
+
+@pytest.mark.parametrize(
+    ("objective", "valid"),
+    [
+        ({"target": 1.2}, "above 0 and at most 1"),
+        ({"target": 0.5, "better": "neither"}, "absent where objective.better is neither"),
+        ({"measure": "solid_fraction", "target": "full"}, "a value of solid_fraction"),
+    ],
+)
+def test_a_target_that_nothing_can_reach_is_one_sentence(
+    objective: dict[str, Any], valid: str, planned: Planned
+) -> None:
+    with pytest.raises(BadInputError) as caught:
+        planned(objective=objective)
+    (problem,) = caught.value.problems
+    assert (problem.key, problem.value) == ("objective.target", objective["target"])
+    assert problem.valid.startswith(valid)
+
+
+@pytest.mark.parametrize(
+    ("objective", "goal"),
+    [
+        ({}, Goal("tube_fill_of_bed_fraction", 0.95)),
+        ({"target": 0.6}, Goal("tube_fill_fraction", 0.6)),
+        ({"better": "smaller"}, None),
+        ({"measure": "solid_fraction"}, None),
+    ],
+)
+def test_the_fill_of_a_tube_has_a_target(objective: dict[str, Any], goal: Goal | None) -> None:
+    assert Objective(**objective).goal == goal

@@ -292,7 +292,7 @@ def test_runs_are_collected_and_reported(tmp_path: Path) -> None:
     assert summary["speed_m_s"].tolist() == pytest.approx([1.001, 1.002, 2.002, 2.004])
     write_report(folder, folder / "report.html")
     page = (folder / "report.html").read_text()
-    assert "Use 20 °: there the speed is highest." in page
+    assert "Of the two, 20 ° gives the larger speed, " in page
     assert "speed from v_speed" in page
     assert "Runs gone on with from a restart file after a kill: 4." in page
     assert (folder / "figures" / "curves.svg").exists()

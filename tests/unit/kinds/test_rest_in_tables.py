@@ -11,10 +11,11 @@ import pytest
 from sandmould.engines.snapshot import Snapshot
 from sandmould.kinds.sand.measure import write_measures
 from sandmould.kinds.sand.moments import list_moments, nearest
-from sandmould.report.curves import best_passage, time_chart
+from sandmould.report.curves import time_chart
 from sandmould.report.method import measured_when
 from sandmould.report.sand import _chosen
 from sandmould.runs.columns import during_vibration
+from sandmould.statistics.over_time import passage_of
 from sandmould.statistics.verdict import compare_settings
 from sandmould.study.collect import gather
 from tests.unit.report_study import DURATION_S, FILLING_S, KEY, PLANTED, scenario, write_study
@@ -67,9 +68,9 @@ def test_curves_end_with_the_vibration(study: Path) -> None:
     for line in chart.lines:
         assert (np.diff(line.xy[:, 0]) > 0.0).all()
         assert line.xy[-1, 1] > 0.05
-    passage = best_passage(found, verdict, FILL)
+    passage = passage_of(found.curves, [RUN], FILL)
     assert passage is not None
-    assert passage[2] > 0.05
+    assert passage.last > 0.05
 
 
 def test_pictures_and_profiles_of_the_end_show_the_sand_at_rest(study: Path) -> None:

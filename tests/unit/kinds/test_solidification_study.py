@@ -162,10 +162,10 @@ def test_a_study_is_computed_collected_and_reported(tmp_path: Path) -> None:
         '<p class="first">The cheapest setting within 5' in page
         or "No setting comes within" in page
     )
-    assert "All settings against element 0.005 m, exchange difference" in page
+    assert "All settings against element 5 mm, exchange difference" in page
     assert "The casting is solid after" in page
     assert "Cooling curves" in page
-    assert "Stand-ins by their sources" in page
+    assert "Placeholder values" in page
     assert "casting solidus" in page
     names = {path.name for path in (folder / "figures").iterdir()}
     assert {"fields.png", "error_cost.svg", "curves.svg"} <= names

@@ -31,6 +31,8 @@ def finished(tmp_path_factory: pytest.TempPathFactory) -> Path:
         texts = {
             "faces": (SWEEP + OBJECTIVE) % ("exchange: faces", "[0.01, 0.02]"),
             "difference": (SWEEP + OBJECTIVE) % ("exchange: difference", "[0.01, 0.02, 0.04]"),
+            "alone": (SWEEP.replace("sweep: {keys: {element_m: %s}}", "%s") + OBJECTIVE)
+            % ("exchange: faces, element_m: 0.02", "sweep: {}"),
             "both": study_text(elements_m=(0.02, 0.01), exchanges=("faces",)) + OBJECTIVE,
         }
         for name, text in texts.items():
@@ -52,7 +54,7 @@ def test_studies_of_one_key_stand_over_it(finished: Path, monkeypatch: pytest.Mo
     assert status == 0, err
     lines = out.splitlines()
     assert lines[2].split() == ["setting", "faces", "difference"]
-    assert re.match("0.04 m +– +0", lines[5])
+    assert re.match("40 mm +– +0", lines[5])
     assert out.rstrip().endswith("page.html\npage.svg")
     assert "faces: faces says so." in lines
     page = Path("page.html").read_text()
@@ -71,6 +73,17 @@ def test_studies_without_a_common_key_stand_in_rows(
     chart = found.chart()
     assert len(chart.rows) == len(chart.marks) == 4
     assert chart.rows[0].startswith("faces: ")
+
+
+@pytest.mark.parametrize("other", ["faces", "both"])
+def test_a_study_that_sweeps_nothing_stands_beside_any_other(
+    other: str, finished: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.chdir(finished)
+    for pair in (("alone", other), (other, "alone")):
+        found = read_comparison([Path("results") / name for name in pair])
+        assert len(found.labels) == 3
+        assert "the one setting" in found.text()
 
 
 def test_what_cannot_be_compared_is_one_sentence(

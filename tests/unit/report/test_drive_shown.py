@@ -6,11 +6,10 @@ import numpy as np
 import pandas as pd
 import pytest
 
-from sandmould.report.drive import amplitudes_text, drive_at, drive_of, with_amplitudes
+from sandmould.report.drive import drive_at, drive_of
 from sandmould.runs.columns import OUTCOME_CODE
 from sandmould.scenario.drive import ACCELERATION, DISPLACEMENT, VELOCITY, BoxDrive
 from sandmould.scenario.scenario import Scenario
-from sandmould.statistics.verdict import compare_settings
 
 KEY = "vibration.0.frequency_hz"
 TABLE = {"moment_kg_m": 1, "moving_mass_kg": 60, "mount_frequency_hz": 8, "flask_depth_m": 0.3}
@@ -31,29 +30,6 @@ def test_between_settings_a_held_acceleration_stays_held() -> None:
     assert found is not None
     exact = BoxDrive(57.0, 1e-3 * (57.0 / 50.0) ** -2)
     assert found == pytest.approx(exact.columns())
-    assert amplitudes_text(found) == "0.769 mm to either side, 276 mm/s and 10.1 g"
-
-
-@pytest.mark.parametrize(
-    ("apart", "said"),
-    [
-        (0.1, " is best: "),
-        (0.0, "Not resolved: "),
-    ],
-)
-def test_the_first_sentence_says_what_to_set(apart: float, said: str) -> None:
-    rows = [
-        {KEY: hz, "replicate": r, "seed": r, OUTCOME_CODE: 0, "fill": base + 0.001 * r * hz / 50}
-        for hz, base in ((25.0, 0.5), (50.0, 0.5 + apart))
-        for r in (1, 2, 3)
-    ]
-    verdict = compare_settings(pd.DataFrame(rows), [KEY], "fill")
-    drives = {s.label: BoxDrive(float(s.values[KEY]), 1.5e-4) for s in verdict.settings}
-    first, *others = with_amplitudes(verdict, drives).sentences
-    assert said in first
-    assert "0.150 mm to either side, 47.1 mm/s and 1.51 g." in first
-    assert tuple(others) == verdict.sentences[1:]
-    assert with_amplitudes(verdict, {}) == verdict
 
 
 def test_runs_that_failed_and_those_without_a_drive_do_not_count() -> None:

@@ -15,7 +15,7 @@ from sandmould.report.filling import FillingPages, filling_pages
 from sandmould.report.page import write_report
 from sandmould.statistics.verdict import compare_settings
 from sandmould.study.collect import collect, gather, read_study
-from tests.unit.report_study import DURATION_S, KEY, scenario, write_study
+from tests.unit.report_study import KEY, scenario, write_study
 
 BEST_HZ = 40.0
 HZ = (10.0, 20.0, BEST_HZ, 80.0, 160.0)
@@ -36,40 +36,23 @@ def pages(folder: Path, height: float, spread: float, **objective: object) -> Fi
     tree["sweep"]["keys"] = {KEY: list(HZ)}
     study = SandStudy.model_validate(tree)
     collected = gather(folder)
-    verdict = compare_settings(
-        collected.summary, collected.keys, "tube_fill_fraction", "larger", ()
-    )
+    verdict = compare_settings(collected.summary, collected.keys, "tube_fill_fraction")
     found = filling_pages(study, collected, verdict, scenario(BEST_HZ))
     assert found is not None
     return found
 
 
-def test_limbs_and_time_are_found_again(tmp_path: Path) -> None:
+def test_limbs_are_found_again(tmp_path: Path) -> None:
     found = pages(tmp_path / "fast", 0.9, 1e-4)
     rise, fall = (float(x.replace("−", "-")) for x in re.findall(r"of (\S+) ±", found.limbs))
     assert rise == pytest.approx(1.0, abs=0.01)
     assert fall == pytest.approx(-0.5, abs=0.01)
     assert "fastest over the first 0.50 s at 40 Hz" in found.limbs
-    # Fill and solid fraction as the runs were planted; records come a quarter of a second apart.
-    end = 1 - math.exp(-2 * DURATION_S)
-    level = 0.95 * (0.78 + 0.04 * end)
-    reached_s = -math.log(1 - level * end / 0.9) / 2
-    told = float(re.search(r"at 40 Hz after (\S+)", found.advice[0]).group(1))  # type: ignore[union-attr]
-    assert told == pytest.approx(reached_s, abs=0.05)
-
-
-def test_a_cavity_that_does_not_fill_is_told(tmp_path: Path) -> None:
-    found = pages(tmp_path / "slow", 0.5, 0.002)
-    assert found.advice[0].startswith(
-        "0 of 3 runs at 40 Hz reach 95 % of what fits into the cavity"
-    )
-    assert "After 2 s it holds 61 % of it" in found.advice[0]
 
 
 def test_the_chart_has_a_curve_a_time_and_what_others_found(tmp_path: Path) -> None:
     reported = [{"value": 65.0, "by": "someone"}]
     chart = pages(tmp_path / "chart", 0.5, 0.002, reported_best=reported).chart
-    assert chart is not None
     assert [line.label for line in chart.lines] == [
         "0 s",
         "0.25 s",
@@ -90,7 +73,7 @@ def test_the_page_shows_it(tmp_path: Path) -> None:
     write_report(folder, folder / "report.html")
     page = (folder / "report.html").read_text()
     assert "Filling over what is swept" in page
-    assert "mm to either side" in page
+    assert "mm, 1.5 g)" in page
 
 
 @pytest.mark.slow
@@ -109,5 +92,5 @@ def test_its_figures_are_files_too(tmp_path: Path) -> None:
 def test_other_measures_have_no_filling(tmp_path: Path) -> None:
     folder = write_study(tmp_path / "tube")
     collected = gather(folder)
-    verdict = compare_settings(collected.summary, collected.keys, "solid_fraction", "larger", ())
+    verdict = compare_settings(collected.summary, collected.keys, "solid_fraction")
     assert filling_pages(read_study(folder), collected, verdict, scenario(50.0)) is None

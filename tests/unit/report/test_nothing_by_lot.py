@@ -23,5 +23,6 @@ def test_it_asks_for_no_replicates(
     folder = Path("results/plain")
     write_report(folder, folder / "report.html")
     page = (folder / "report.html").read_text(encoding="utf-8")
-    assert "usable replicates" not in page
+    assert "replicates: " not in page
+    assert "Fewer than 3 runs" not in page
     assert "Nothing is drawn by lot, so a setting is one run" in page

@@ -12,14 +12,15 @@ import pytest
 from sandmould.drawing.chart import Chart
 from sandmould.kinds.sand.kind import SandStudy
 from sandmould.report.answer import optimum_choice, optimum_headline
-from sandmould.report.next_steps import optimum_steps
 from sandmould.report.optimum import optimum_pages, with_surface
 from sandmould.report.page import write_report
 from sandmould.scenario.drive import BoxDrive
-from sandmould.statistics.verdict import compare_settings
+from sandmould.statistics.answer import Asked
+from sandmould.statistics.decision import Evidence, decide
 from sandmould.study.collect import collect, gather, read_study
 from sandmould.study.rounds.decide import next_round
 from sandmould.study.rounds.round_log import RoundLog, basis_of, write_rounds
+from sandmould.wording.next_steps import optimum_steps
 from tests.unit.report_study import KEY, write_study
 
 BEST_HZ = 48.0
@@ -50,9 +51,7 @@ def test_the_report_begins_with_the_optimum(tmp_path: Path) -> None:
     text = (folder / "report.html").read_text(encoding="utf-8")
     first, detail = text.index('class="verdict resolved"'), text.index('id="details"')
     answer = re.sub(r"<[^>]+>", "", text[first:detail]).replace("\xa0", " ")
-    assert re.search(
-        r"Shake at 4\d(\.\d)? Hz \([\d.]+ to [\d.]+ Hz\): there the tube fills", answer
-    )
+    assert re.search(r"4\d(\.\d)? Hz \(95 %: [\d.]+ to [\d.]+ Hz\) fills the tube best", answer)
     said = re.sub(r"<[^>]+>", "", text[detail : detail + 900]).replace("\xa0", " ")
     assert re.search(
         r"The fill of the tube is highest at frequency 4\d(\.\d)? Hz \(95 % inter", said
@@ -94,17 +93,16 @@ def test_an_interval_at_the_end_of_the_sweep_is_not_resolved(tmp_path: Path) -> 
     pages = optimum_pages(folder, study, found.summary)
     assert pages is not None
     assert not pages.sound
-    assert pages.sentences[0].startswith("Not resolved: among what was swept")
-    assert "reaches the highest frequency swept, so" in pages.sentences[0]
+    assert pages.optimum is not None
+    assert pages.optimum.at_end(KEY) == "highest"
     assert pages.sentences[-1].startswith("No round added any runs to the 21 of the sweep")
     assert "Rounds go on" in pages.sentences[-1]
-    verdict = compare_settings(found.summary, [KEY], "tube_fill_fraction")
-    said, is_sound = optimum_headline(pages, None, verdict, found.summary, has_speed=False)
-    assert said.startswith("Not resolved: by these runs the best is near 1")
+    answer = decide(Asked("tube_fill_fraction", "larger", (KEY,)), Evidence(found.summary))
+    said, is_sound = optimum_headline(pages, None, answer, found.summary, has_speed=False)
+    assert said.startswith("The best is near 1")
+    assert "beyond the highest" in said
     assert not is_sound
-    assert "Add a frequency above what was swept: the best may lie there." in [
-        step.text for step in optimum_steps(study, pages, None)
-    ]
+    assert "a frequency above" in optimum_steps(study, pages.optimum, None)[0].text
 
 
 def test_the_drive_at_the_optimum_is_told_in_mm_and_g(tmp_path: Path) -> None:
@@ -117,20 +115,15 @@ def test_the_drive_at_the_optimum_is_told_in_mm_and_g(tmp_path: Path) -> None:
     pages = optimum_pages(folder, read_study(folder), summary)
     assert pages is not None
     assert pages.optimum is not None
-    at_best = BoxDrive(pages.optimum.setting[KEY], 1e-4)
-    said = next(text for text in pages.sentences if "mm to either side" in text)
-    found = re.search(r"moves 0\.100 mm to either side, (\S+) mm/s and (\S+) g\.$", said)
-    assert found is not None
-    assert float(found[1]) == pytest.approx(1e3 * at_best.velocity_m_s, rel=5e-3)
-    assert float(found[2]) == pytest.approx(at_best.acceleration_g, rel=5e-3)
-    verdict = compare_settings(summary, [KEY], "tube_fill_fraction")
-    shown = optimum_choice(pages, summary.assign(tube_fill_of_bed_fraction=0.5), verdict, False)
+    answer = decide(Asked("tube_fill_fraction", "larger", (KEY,)), Evidence(summary))
+    shared = summary.assign(tube_fill_of_bed_fraction=0.5)
+    shown = optimum_choice(pages, shared, answer.verdict, False)
     figures = {it.label: it.value for it in shown}
     assert figures["amplitude (half of peak to peak)"] == "0.100 mm"
     share = 100 * 0.5 * pages.optimum.value[0] / float(summary["tube_fill_fraction"].mean())
     assert figures["of what fits in, about"] == f"{share:.0f} %"
-    said, _ = optimum_headline(pages, None, verdict, summary, has_speed=False)
-    assert " with an amplitude of 0.100 mm, half of peak to peak (" in said
+    said, _ = optimum_headline(pages, None, answer, summary, has_speed=False)
+    assert " (±0.1 mm, " in said
 
 
 def test_wider_than_asked_is_not_sound_and_the_cost_is_told(tmp_path: Path) -> None:
@@ -142,7 +135,7 @@ def test_wider_than_asked_is_not_sound_and_the_cost_is_told(tmp_path: Path) -> N
     assert pages is not None
     assert not pages.sound
     assert pages.sentences[-1].startswith("1 round added 5 runs to the 21 of the sweep")
-    (step,) = optimum_steps(study, pages, None)
+    (step,) = optimum_steps(study, pages.optimum, None)
     assert step.line == "refine: {rounds: 4}"
 
 

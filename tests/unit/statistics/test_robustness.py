@@ -28,6 +28,7 @@ from sandmould.study.plan.load_study import OpenStudy, open_study
 from sandmould.study.robustness.controls import BY_FACTOR, SHAKEN_HZ, Case, cases
 from sandmould.study.rounds.decide import choose_controls, next_round
 from sandmould.study.rounds.round_log import RoundLog, basis_of, read_rounds, write_rounds
+from sandmould.wording.robustness import robustness_sentences
 
 FREQUENCY = "vibration.0.frequency_hz"
 FILL = "tube_fill_fraction"
@@ -315,7 +316,7 @@ def test_an_optimum_that_nothing_moves_belongs_to_the_sand(tmp_path: Path) -> No
     assert found.cause == "rearrangement of grains"
     assert not found.is_artefact
     assert {m.verdict for m in found.shifts} == {"held"}
-    assert found.sentences[0].startswith("The optimum at 50 Hz belongs to the sand: it does not")
+    assert (found.best_hz, found.lacking) == (50.0, ())
 
 
 FOLLOWING = {SPRINGS[0]: 25.0, SPRINGS[1]: 100.0}
@@ -324,12 +325,9 @@ FOLLOWING = {SPRINGS[0]: 25.0, SPRINGS[1]: 100.0}
 def test_an_optimum_that_goes_with_springs_and_depth_is_the_beds(tmp_path: Path) -> None:
     column = FOLLOWING | {"bed_depth x0.5": 100.0, "bed_depth x2": 25.0}
     found = assessed(tmp_path, column)
-    assert found.cause == "resonance of the bed"
+    assert found.cause == "bed resonance"
     assert not found.is_artefact
-    assert (
-        "moves with the springs and with bed depth x0.5 and bed depth x2 as c/(4 H)"
-        in (found.sentences[0])
-    )
+    assert [m.name for m in found.moved_by("bed_depth")] == ["bed depth x0.5", "bed depth x2"]
     # Springs alone are not enough to call it a column.
     alone = assessed(tmp_path, FOLLOWING)
     assert alone.cause == "follows the springs"
@@ -351,13 +349,17 @@ def test_other_factors_of_the_depth_reach_the_same_verdict(
 
 def test_what_is_held_and_the_numerics_are_told_apart(tmp_path: Path) -> None:
     held = assessed(tmp_path, {"hold velocity": 70.0, "hold displacement": 100.0})
-    assert held.cause == "artefact of what is held constant"
-    assert "velocity held and displacement held" in held.sentences[0]
+    assert held.cause == "held artefact"
+    assert [m.name for m in held.moved_by("hold")] == ["velocity held", "displacement held"]
     step = assessed(tmp_path, {"hold velocity": 70.0, "time_step x0.5": 75.0})
-    assert step.cause == "artefact of the numerics"
-    assert "It moves up with velocity held and time step x0.5." in step.sentences[1]
+    assert step.cause == "numerics artefact"
+    assert {m.name: m.verdict for m in step.moved} == {
+        "velocity held": "up", "time step x0.5": "up"
+    }  # fmt: skip
     both = assessed(tmp_path, {"hold velocity": 30.0, "time_step x0.5": 75.0})
-    assert both.sentences[1] == "It moves up with time step x0.5 and down with velocity held."
+    said = robustness_sentences(both)
+    assert said[0].endswith("is an artefact of the numerics: it moves with time step x0.5.")
+    assert said[1] == "It moves up with time step x0.5 and down with velocity held."
 
 
 def test_noise_leaves_it_unresolved(tmp_path: Path) -> None:
@@ -365,8 +367,7 @@ def test_noise_leaves_it_unresolved(tmp_path: Path) -> None:
     table = planted(lambda part, f: hill(f, BEST_HZ), PARTS, 0.1, seed=4)
     found = assess_study(table, opened(tmp_path).study)
     assert found.cause == "unresolved"
-    assert "does not tell" in found.sentences[0]
-    assert any(s.startswith("Not told: ") for s in found.sentences)
+    assert found.untold
 
 
 def test_controls_that_were_not_asked_or_failed_keep_it_unresolved(tmp_path: Path) -> None:
@@ -375,9 +376,10 @@ def test_controls_that_were_not_asked_or_failed_keep_it_unresolved(tmp_path: Pat
     table.loc[table["part"].isin(failed), "outcome_code"] = 311
     found = assess_study(table, opened(tmp_path).study)
     assert found.cause == "unresolved"
-    for words in ("time step x0.5 does not tell", "the springs do not tell", "hold was not asked",
-                  "engine was not asked"):  # fmt: skip
-        assert words in found.sentences[0]
+    assert found.lacking == ("hold", "engine")
+    assert [m.name for m in found.untold] == ["time step x0.5"]
+    assert found.springs is not None
+    assert found.springs.own.dependence == "unresolved"
 
 
 def test_frequencies_are_chosen_round_the_optimum_and_anew_after_more_rounds(

@@ -15,7 +15,7 @@ from sandmould.definition.certificate import round_best_hz, spanned_hz
 from sandmould.scenario.reading import Origin, validated
 from sandmould.statistics.config import Objective, SandWaveSpeed
 from sandmould.statistics.control_case import SPRINGS, ControlCase
-from sandmould.statistics.recommendation import ModelWaveSpeed, Recommendation, recommend
+from sandmould.statistics.recommendation import ModelWaveSpeed, Recommendation, Why, recommend
 from sandmould.statistics.robustness import Robustness, assess_robustness
 from sandmould.statistics.spring_dependence import (
     FOLLOWS,
@@ -23,7 +23,11 @@ from sandmould.statistics.spring_dependence import (
     SpringCheck,
     assess_springs,
     find_limbs,
+)
+from sandmould.wording.robustness import (
     held_text,
+    recommendation_sentence,
+    spring_sentence,
 )
 
 KEY, FILL = "vibration.0.frequency_hz", "tube_fill_fraction"
@@ -115,9 +119,7 @@ def test_an_optimum_that_follows_the_springs_gets_no_frequency_in_hz(seed: int) 
     assert own.ratio == pytest.approx(4.0, rel=0.3)
     assert robustness.cause == "follows the springs"
     assert recommended(robustness).interval_hz is None
-    assert recommended(robustness).sentence.startswith(
-        "No frequency in Hz is recommended: the optimum follows the springs"
-    )
+    assert recommended(robustness).why is Why.NO_SOURCE
 
 
 @pytest.mark.parametrize("seed", range(2))
@@ -127,16 +129,14 @@ def test_one_that_does_not_follow_the_springs_is_recommended(seed: int) -> None:
     assert [v.dependence for v in robustness.springs.holds] == [STAYS] * 3
     assert robustness.springs.own.ratio == pytest.approx(1.0, rel=0.2)
     assert recommended(robustness).interval_hz == (38.0, 42.0)
-    assert recommended(robustness).sentence.startswith(
-        "Recommended with the acceleration held: 38 to 42 Hz; the optimum does not follow"
-    )
+    assert recommended(robustness).why is Why.STAYS
 
 
 def test_a_plateau_is_none() -> None:
     robustness = robust(planted(plateau))
     assert robustness.springs is not None
     assert [v.dependence for v in robustness.springs.holds] == ["none"] * 3
-    assert robustness.springs.own.sentence.startswith(
+    assert spring_sentence(robustness.springs.own).startswith(
         "With the acceleration held there is no inner optimum: no frequency is better than the "
         "highest one with springs x0.25, x1 and x4 (a drop below 0.0"
     )
@@ -180,7 +180,7 @@ def test_an_optimum_in_soft_sand_alone_is_none() -> None:
 
     found = check(planted(curve))
     assert found.own.dependence == "none"
-    assert "no frequency is better than the highest one with springs x4 (" in found.own.sentence
+    assert {(c.factor, c.limbs.shape) for c in found.own.lacking} == {(4.0, "rising")}
 
 
 def test_an_optimum_that_goes_half_as_far_is_not_resolved() -> None:
@@ -188,17 +188,15 @@ def test_an_optimum_that_goes_half_as_far_is_not_resolved() -> None:
     robustness = robust(planted(lambda hz, factor, hold: hill(hz, 40.0 * factor**0.25)))
     assert robustness.springs is not None
     assert robustness.springs.own.dependence == "unresolved"
-    assert "whether it follows them is not resolved" in robustness.springs.own.sentence
     assert robustness.cause == "unresolved"
-    assert "the springs do not tell" in robustness.sentences[0]
-    assert "is not resolved" in recommended(robustness).sentence
+    assert recommended(robustness).why is Why.UNRESOLVED
 
 
 def test_noise_does_not_show_that_there_is_no_optimum() -> None:
     """Runs that could not tell a drop of two margins leave it open, those of less noise do not."""
     loud, quiet = (check(planted(plateau, sd=sd)).own for sd in (0.1, 0.02))
     assert loud.dependence == "unresolved"
-    assert loud.sentence.startswith("With the acceleration held nothing can be told: no frequency")
+    assert loud.lacking
     assert quiet.dependence == "none"
 
 
@@ -250,7 +248,7 @@ def test_failed_runs_leave_it_open() -> None:
     table.loc[hard & (table[KEY] > 25.0), "outcome_code"] = 311
     own = check(table).own
     assert own.dependence == "unresolved"
-    assert "nothing can be told: too few runs can be used with springs x4." in own.sentence
+    assert [(c.factor, c.limbs.shape) for c in own.lacking] == [(4.0, "no result")]
     few = planted(follows)
     few.loc[hard & (few[KEY] == SPAN_HZ[-1]), "outcome_code"] = 311
     # The next frequency is then the end: the top has no other limb.
@@ -271,13 +269,12 @@ def test_a_wave_speed_with_a_source_gives_a_frequency_with_its_spread() -> None:
     robustness = robust(planted(follows))
     found = recommended(robustness, sand)
     assert found.interval_hz == pytest.approx((38.0 * 100 / 120, 42.0 * 160 / 120))
-    assert "100 to 160 m/s (Nobody 2020, 2 kPa)" in found.sentence
-    assert "120 m/s (of a row of grains, an estimate)" in found.sentence
+    said = recommendation_sentence(found)
+    assert "100 to 160 m/s (Nobody 2020, 2 kPa)" in said
+    assert "120 m/s (of a row of grains, an estimate)" in said
     soft = recommended(robustness, sand, ModelWaveSpeed(19.0, "measured"))
     assert soft.interval_hz is None
-    assert (
-        "the model's wave speed, 19 m/s (measured), is not that of the sand, 100" in soft.sentence
-    )
+    assert soft.why is Why.OTHER_SAND
 
 
 def test_numerics_that_move_it_forbid_a_recommendation() -> None:
@@ -292,9 +289,7 @@ def test_numerics_that_move_it_forbid_a_recommendation() -> None:
     )
     found = recommend(robustness, (38.0, 42.0), ROW, None)
     assert found is not None
-    assert found.sentence == (
-        "No frequency in Hz is recommended: the optimum moves with the numerics."
-    )
+    assert (found.interval_hz, found.why) == (None, Why.NUMERICS)
 
 
 def test_drops_are_those_of_a_textbook() -> None:

@@ -1,0 +1,157 @@
+"""The answer of a study, typed: what was asked, what counts, how well it is known, what limits it.
+
+Numbers and names only: ``sandmould.wording`` turns it into sentences.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from enum import StrEnum
+
+from sandmould.scenario.drive import BoxDrive
+from sandmould.statistics.config import Better, Goal
+from sandmould.statistics.over_time import Passage
+from sandmould.statistics.refining import Refining
+from sandmould.statistics.settings import Setting
+from sandmould.statistics.verdict import Verdict
+
+
+class Decided(StrEnum):
+    """What the runs of a study say of its question."""
+
+    NO_RESULT = "no result"
+    VALUE = "value"
+    """Of the one setting."""
+    RANGE = "range"
+    """Of a value over what is swept, where neither end is better."""
+    FINEST = "finest"
+    """Of sizes that only compute the same more finely."""
+    NO_EFFECT = "no effect"
+    """The runs of all settings are the same, bit for bit."""
+    EQUAL = "equal"
+    """The measure is the same at all settings."""
+    NONE_REACHES = "none reaches"
+    REACHED = "reached"
+    """One setting or several reach the target."""
+    BEST = "best"
+    BEST_AT_END = "at an end"
+    OPEN = "open"
+
+
+@dataclass(frozen=True)
+class Asked:
+    """The question of a study."""
+
+    measure: str
+    better: Better
+    keys: tuple[str, ...]
+    """What is swept."""
+    goal: Goal | None = None
+    by_lot: bool = True
+    """Whether runs of one setting differ by their seeds."""
+
+
+@dataclass(frozen=True)
+class SweepEnd:
+    """An end of the sweep at which the best setting lies."""
+
+    key: str
+    value: float
+    is_highest: bool
+
+
+@dataclass(frozen=True)
+class Answer:
+    """What the runs say, and what that rests on."""
+
+    asked: Asked
+    decided: Decided
+    verdict: Verdict
+    """The evidence: every setting with its mean, and the best against each other one."""
+    shares: Mapping[str, Setting] = field(default_factory=dict)
+    """Settings by the column of the target, by label; empty without one."""
+    reach: tuple[Setting, ...] = ()
+    """Settings that reach the target, the gentlest first."""
+    shortest: Setting | None = None
+    """That of them which reaches it first, where the runs tell."""
+    shortest_s: float = 0.0
+    ends: tuple[SweepEnd, ...] = ()
+    further_runs: int | None = None
+    """More runs of each open setting that would decide; None where no number would."""
+    numerical_error: float | None = None
+    """Of a difference between settings without chance; None where no size tells it."""
+    refining: Refining | None = None
+    passage: Passage | None = None
+    """Of the best setting over its vibration."""
+    left_out: Mapping[str, int] = field(default_factory=dict)
+    """Runs that do not count, by reason."""
+    one_way: int = 0
+    """Runs in which the sand never felt the pattern give way."""
+    planned: int = 0
+    drives: Mapping[str, BoxDrive] = field(default_factory=dict)
+    """How the box moves, by label of the setting."""
+    stand_ins: tuple[str, ...] = ()
+    """Keys of values that are not what they stand for."""
+    beside: tuple[Answer, ...] = ()
+    """Of what else the runs should do well: other cavities, a pattern."""
+
+    @property
+    def is_sound(self) -> bool:
+        """Whether the question is answered."""
+        return self.decided not in (Decided.NO_RESULT, Decided.OPEN)
+
+    @property
+    def best(self) -> Setting | None:
+        """The setting with the best mean."""
+        return self.verdict.best
+
+    @property
+    def used(self) -> tuple[Setting, ...]:
+        """Settings with runs that count."""
+        return tuple(s for s in self.verdict.settings if s.n)
+
+    @property
+    def alike(self) -> tuple[Setting, ...]:
+        """The best setting, and those that are not told apart from it."""
+        open_ = {c.other for c in self.verdict.comparisons if not c.separated}
+        ranked = [self.verdict.setting(c.other) for c in self.verdict.comparisons]
+        best = () if self.best is None else (self.best,)
+        return (*best, *(s for s in ranked if s.label in open_))
+
+    @property
+    def worse(self) -> tuple[Setting, ...]:
+        """Settings that are told to be worse than the best."""
+        told = [c.other for c in self.verdict.comparisons if c.separated]
+        return tuple(self.verdict.setting(label) for label in told)
+
+    @property
+    def wanted(self) -> tuple[str, ...]:
+        """Labels of the settings that suit it, the best first; none without a result."""
+        if self.decided is Decided.REACHED:
+            return tuple(s.label for s in self.reach)
+        if self.decided in (Decided.NO_EFFECT, Decided.EQUAL):
+            return tuple(s.label for s in self.used)
+        is_told = self.asked.by_lot and not self.verdict.resolved
+        return tuple(s.label for s in (self.alike if is_told else self.alike[:1]))
+
+    @property
+    def common(self) -> tuple[str, ...]:
+        """Labels of the settings that suit all that the runs should do well."""
+        each = [a.wanted for a in (self, *self.beside) if a.wanted]
+        return tuple(s for s in self.wanted if all(s in wanted for wanted in each))
+
+    @property
+    def trades(self) -> bool:
+        """Whether no setting suits all that the runs should do well."""
+        return bool(self.wanted and self.beside) and not self.common
+
+    @property
+    def still_changes(self) -> float:
+        """Share by which the measure changed in the last quarter at the best setting, or 0."""
+        return self.passage.change if self.passage else 0.0
+
+    @property
+    def longer_helps(self) -> bool:
+        """Whether the best setting was still getting better as its vibration ended."""
+        return self.still_changes * (1.0 if self.asked.better == "larger" else -1.0) > 0.0

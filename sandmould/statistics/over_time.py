@@ -1,0 +1,107 @@
+"""How a measure goes over the time of vibration: its last quarter, and when it reaches a level."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterable
+from dataclasses import dataclass
+
+import numpy as np
+import pandas as pd
+from numpy.typing import ArrayLike
+
+from sandmould.runs.columns import RUN, STAGE, VIBRATION_TIME_S, during_vibration
+
+STILL = 0.02
+"""Share by which a measure may still change in the last quarter of a vibration."""
+
+
+@dataclass(frozen=True)
+class Passage:
+    """A measure during the vibration, as the mean of some runs."""
+
+    first: float
+    late: float
+    """At three quarters of the time."""
+    last: float
+    lasts_s: float
+
+    @property
+    def change(self) -> float:
+        """Share by which it changed in the last quarter; 0 where that is less than ``STILL``."""
+        change = self.last / self.late - 1.0 if self.late else 0.0
+        return change if abs(change) >= STILL else 0.0
+
+
+def passage_of(curves: pd.DataFrame, runs: Iterable[str], measure: str) -> Passage | None:
+    """A measure of some runs over their vibration.
+
+    Parameters
+    ----------
+    curves : DataFrame
+        One row a snapshot.
+    runs : iterable of str
+        Names of runs that count.
+    measure : str
+
+    Returns
+    -------
+    Passage or None
+        None where no run tells.
+    """
+    shaken = _shaken(curves, runs, measure)
+    passages = []
+    for _, run in shaken.groupby(RUN):
+        time_s, value = (run[c].to_numpy(dtype=np.float64) for c in (VIBRATION_TIME_S, measure))
+        if len(time_s) > 3 and np.isfinite(value).all():
+            late = float(np.interp(0.75 * time_s[-1], time_s, value))
+            passages.append((float(value[0]), late, float(value[-1]), float(time_s[-1])))
+    return Passage(*np.mean(passages, axis=0).tolist()) if passages else None
+
+
+def reached_s(curves: pd.DataFrame, runs: Iterable[str], measure: str, level: float) -> float:
+    """Time of vibration after which some runs reach a level, as their mean; NaN where one does not.
+
+    Parameters
+    ----------
+    curves, runs, measure
+        As of ``passage_of``.
+    level : float
+    """
+    shaken = _shaken(curves, runs, measure)
+    times_s = [
+        first_reach_s(run[VIBRATION_TIME_S], run[measure], level) for _, run in shaken.groupby(RUN)
+    ]
+    return float(np.mean(times_s)) if times_s else math.nan
+
+
+def _shaken(curves: pd.DataFrame, runs: Iterable[str], measure: str) -> pd.DataFrame:
+    if measure not in curves or STAGE not in curves:
+        return pd.DataFrame(columns=[RUN])
+    return during_vibration(curves[curves[RUN].isin(list(runs))])
+
+
+def first_reach_s(time_s: ArrayLike, value: ArrayLike, level: float) -> float:
+    """Time at which a quantity first reaches a level, between two records by straight line.
+
+    Parameters
+    ----------
+    time_s, value : (n,) float64
+        In order of time.
+    level : float
+
+    Returns
+    -------
+    float, s
+        NaN where it never does.
+    """
+    time_s, value = np.asarray(time_s, dtype=np.float64), np.asarray(value, dtype=np.float64)
+    above = np.flatnonzero(value >= level)
+    if not len(above):
+        return math.nan
+    after = int(above[0])
+    if after == 0:
+        return float(time_s[0])
+    before = after - 1
+    share = (level - value[before]) / (value[after] - value[before])
+    return float(time_s[before] + share * (time_s[after] - time_s[before]))

@@ -1,0 +1,337 @@
+"""The answer of a study in words: its first sentence, what it rests on, what it leaves open."""
+
+from __future__ import annotations
+
+import itertools
+import math
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from functools import cached_property
+from typing import Any
+
+from sandmould.runs.formatting import (
+    OF_BED,
+    display_scale,
+    filled_space,
+    is_number,
+    listed,
+    name_of,
+    number,
+    seconds,
+    unit_of,
+    value_text,
+    with_margin,
+)
+from sandmould.scenario.drive import BoxDrive
+from sandmould.scenario.vibration import VibrationStage
+from sandmould.statistics.answer import Answer, Decided
+from sandmould.statistics.refining import Refining
+from sandmould.statistics.settings import Setting
+from sandmould.statistics.verdict import FEW
+from sandmould.wording.templates import sentences, worded
+
+MOST_NAMED = 100
+"""More further runs are named nowhere: their estimate is as uncertain as the difference."""
+NOTHING = 1e-3
+"""Share of the largest value below which one is told as none."""
+_MOST_LABELS = 8
+_WIDEST = 0.5
+"""Half width of an interval of a share beyond which it says nothing."""
+_OF_DRIVE = ("frequency_hz", "acceleration_g", "velocity_m_s", "displacement_m")
+"""Ends of swept keys that the motion of the box states."""
+REASONS = {
+    "did not finish": "{} did not finish",
+    "lags": "in {} the loop between sand and pattern lags",
+    "cycles": "in {} the loop between sand and pattern goes in cycles",
+    "diverged": "in {} the loop between sand and pattern diverged",
+    "no value": "{} without a value",
+}
+"""Why runs do not count, by the name of the reason."""
+
+
+def first_sentence(answer: Answer) -> str:
+    """What a careful engineer says first: one sentence or a few short ones."""
+    return worded("answer.j2", it=AnswerWords(answer))
+
+
+def detail_sentences(answer: Answer) -> tuple[str, ...]:
+    """The comparison behind the answer, with its interval."""
+    return sentences("details.j2", it=AnswerWords(answer))
+
+
+def limit_sentences(answer: Answer) -> tuple[str, ...]:
+    """What the runs leave open."""
+    return sentences("limits.j2", it=AnswerWords(answer))
+
+
+def sand_limits(
+    keys: Sequence[str], stage: VibrationStage | None, is_unchecked: bool
+) -> tuple[str, ...]:
+    """What a sweep over sand leaves open: what the vibration held constant, and the springs.
+
+    Parameters
+    ----------
+    keys : sequence of str
+        Swept keys.
+    stage : VibrationStage, optional
+    is_unchecked : bool
+        Whether the best setting was looked for and its controls have not been run.
+    """
+    hold = stage.hold if stage and any(k.endswith("frequency_hz") for k in keys) else ""
+    return sentences("sand_limits.j2", hold=hold, is_unchecked=is_unchecked)
+
+
+def reasons_text(left_out: Mapping[str, int]) -> str:
+    """How many runs do not count, by reason."""
+    return listed([REASONS[why].format(n) for why, n in left_out.items()])
+
+
+def why_unused(why: str) -> str:
+    """Why one run does not count; empty where it does, or where it did not finish."""
+    states = {"lags": "lags", "cycles": "goes in cycles", "diverged": "diverged"}
+    if why in states:
+        return f"not used: its loop {states[why]}"
+    return "not used: no value of the objective" if why == "no value" else ""
+
+
+def place_text(label: str, keys: Sequence[str], drive: BoxDrive | None, more: str = "") -> str:
+    """A setting as a person sets a table: ``50 Hz (±0.149 mm, 1.5 g)``."""
+    said = {key.rpartition(".")[2] for key in keys}
+    if drive is None or not said.intersection(_OF_DRIVE):
+        return f"{label} ({more})" if more else label
+    amplitude = f"±{1e3 * drive.displacement_m:.3g} mm"
+    frequency = "" if "frequency_hz" in said else f" at {drive.frequency_hz:.3g} Hz"
+    acceleration = "" if "acceleration_g" in said else f"{drive.acceleration_g:.2g} g"
+    if said == {"displacement_m"}:
+        return f"{amplitude}{frequency} ({', '.join(filter(None, [acceleration, more]))})"
+    return f"{label} ({', '.join(filter(None, [amplitude + frequency, acceleration, more]))})"
+
+
+@dataclass(frozen=True)
+class Span:
+    """A value over a sweep: where it is least and most, where it begins, where it changes most."""
+
+    low: tuple[str, str]
+    """Value and label."""
+    high: tuple[str, str]
+    still: str = ""
+    """Label up to which it is about nothing; empty where it begins at once."""
+    begins: tuple[str, str] = ("", "")
+    last: tuple[str, str] = ("", "")
+    steepest: tuple[str, str] = ("", "")
+    """Labels between which it changes most."""
+
+
+@dataclass(frozen=True)
+class AnswerWords:
+    """What templates are given of an answer: its numbers as text, its settings by name."""
+
+    answer: Answer
+
+    def __getattr__(self, name: str) -> Any:
+        """What the answer itself has."""
+        return getattr(self.answer, name)
+
+    @property
+    def name(self) -> str:
+        """Name of the measure."""
+        return name_of(self.answer.asked.measure)
+
+    @property
+    def space(self) -> str:
+        """The tube or cavity that is to be filled; empty for other measures."""
+        measure = self.answer.asked.measure
+        space = filled_space(measure)
+        is_asked = space != measure and self.answer.asked.better == "larger"
+        return space.replace("_", " ") if is_asked else ""
+
+    @property
+    def keys_name(self) -> str:
+        """The swept key by name; ``setting`` where there are several."""
+        keys = self.answer.asked.keys
+        return name_of(keys[0]) if len(keys) == 1 else "setting"
+
+    @property
+    def is_scale(self) -> bool:
+        """Whether one key with numbers is swept."""
+        keys = self.answer.asked.keys
+        return len(keys) == 1 and all(is_number(s.values[keys[0]]) for s in self.answer.used)
+
+    @property
+    def range(self) -> str:
+        """What was tried."""
+        used, keys = self.answer.used, self.answer.asked.keys
+        if len(keys) > 1:
+            return listed([s.label for s in used])
+        values = [value_text(keys[0], s.values[keys[0]]) for s in used]
+        return f"{values[0]} to {values[-1]}" if self.is_scale else listed(values)
+
+    def place(self, setting: Setting) -> str:
+        """A setting with what the table then does."""
+        return place_text(
+            setting.label, self.answer.asked.keys, self.answer.drives.get(setting.label)
+        )
+
+    def either(self, settings: Sequence[Setting]) -> str:
+        """Settings of which each is as good as the others."""
+        return listed([s.label for s in settings], most=_MOST_LABELS)
+
+    def worth(self, setting: Setting) -> str:
+        """What comes of a setting, with as many digits as its error allows."""
+        share = self.answer.shares.get(setting.label)
+        goal = self.answer.asked.goal
+        if share is not None and goal is not None and goal.measure.endswith(OF_BED):
+            return f"{_shown(100 * share.mean, 100 * share.ci_half_width, 0, 100)} % of what fits"
+        return self.value(setting.mean, setting.ci_half_width)
+
+    def value(self, mean: float, half_width: float = math.nan, digits: int = 0) -> str:
+        """A value of the measure with its unit."""
+        measure = self.answer.asked.measure
+        factor = display_scale(measure)[0]
+        unit = "mm" if factor != 1.0 else unit_of(measure)
+        digits = digits or (2 if self.answer.stand_ins else 3)
+        scale = 1.0 if measure.endswith("_fraction") else math.inf
+        text = _shown(factor * mean, factor * half_width, digits, scale)
+        return text + (unit if unit == "°" else f" {unit}" if unit else "")
+
+    @staticmethod
+    def seconds(time_s: float) -> str:
+        """A duration."""
+        return f"{time_s:.2g} s" if time_s < 60.0 else seconds(time_s)
+
+    @property
+    def target(self) -> str:
+        """The value that is good enough."""
+        goal = self.answer.asked.goal
+        return "" if goal is None else self.value(goal.value)
+
+    @property
+    def certainty(self) -> str:
+        """How well a value of one setting is known."""
+        (setting,) = self.answer.used[:1]
+        if setting.n > 1:
+            return f"{setting.n} runs"
+        by_lot = self.answer.asked.by_lot
+        return f"its error is unknown: {'one run' if by_lot else 'one size of elements or steps'}"
+
+    @property
+    def reasons(self) -> str:
+        """Why runs do not count."""
+        return reasons_text(self.answer.left_out)
+
+    @property
+    def lasts(self) -> str:
+        """Time of vibration."""
+        return self.seconds(self.answer.passage.lasts_s) if self.answer.passage else ""
+
+    @property
+    def fewest(self) -> int:
+        """Runs of the setting that has fewest."""
+        return min((s.n for s in self.answer.used), default=0)
+
+    @property
+    def runs_each(self) -> str:
+        """Runs of each setting, as a range where they have unlike ones."""
+        most = max(s.n for s in self.answer.used)
+        runs = f"{most}" if most == self.fewest else f"{self.fewest} to {most}"
+        return f"{runs} run{'s' if most > 1 else ''}"
+
+    @property
+    def difference(self) -> str:
+        """Of the best from the next, without a sign."""
+        verdict = self.answer.verdict
+        half = self.answer.numerical_error or math.nan
+        if self.answer.asked.by_lot:
+            half = (verdict.ci[1] - verdict.ci[0]) / 2.0
+        return self.value(abs(verdict.difference), half)
+
+    @property
+    def is_of_means(self) -> bool:
+        """Whether that difference is the one of the two means."""
+        best, second = self.answer.best, self.answer.verdict.runner_up
+        apart = best.mean - second.mean if best and second else math.nan
+        return math.isclose(self.answer.verdict.difference, apart, rel_tol=1e-6, abs_tol=1e-12)
+
+    @property
+    def few(self) -> str:
+        """Settings with too few runs to tell chance by."""
+        few = [s.label for s in self.answer.used if s.n < FEW]
+        return listed(few) if self.answer.asked.by_lot else ""
+
+    @property
+    def empty(self) -> str:
+        """Settings without a run that counts."""
+        return listed([s.label for s in self.answer.verdict.settings if not s.n])
+
+    @property
+    def no_chance(self) -> str:
+        """Settings whose replicates are the same as those of the best."""
+        best = self.answer.best
+        if best is None or best.n < 2 or self.answer.decided is Decided.NO_EFFECT:
+            return ""
+        against = self.answer.verdict.comparisons
+        same = [c.other for c in against if not c.tested and self.verdict.setting(c.other).n > 1]
+        return listed(same)
+
+    @property
+    def more_runs(self) -> int:
+        """Further runs of each open setting that would decide; 0 where no sensible number would."""
+        more = self.answer.further_runs
+        return more if more is not None and more <= MOST_NAMED else 0
+
+    @property
+    def stand_in_sections(self) -> str:
+        """What the stand-in values belong to."""
+        return listed(sorted({key.partition(".")[0] for key in self.answer.stand_ins}))
+
+    @cached_property
+    def others(self) -> tuple[AnswerWords, ...]:
+        """The other cavities and the pattern."""
+        return tuple(AnswerWords(each) for each in self.answer.beside)
+
+    @property
+    def sizes(self) -> Refining:
+        """What smaller sizes say together."""
+        assert self.answer.refining is not None
+        return self.answer.refining
+
+    @property
+    def size_texts(self) -> list[str]:
+        """The sizes, the coarsest first."""
+        return [value_text(self.sizes.key, size) for size in self.sizes.sizes]
+
+    @property
+    def refined(self) -> str:
+        """The value towards no size at all with its error, chance included."""
+        finest = min(self.answer.used, key=lambda s: float(s.values[self.sizes.key]))
+        chance = finest.ci_half_width if math.isfinite(finest.ci_half_width) else 0.0
+        return self.value(self.sizes.value, math.hypot(self.sizes.error, chance))
+
+    @property
+    def span(self) -> Span:
+        """The measure over the sweep."""
+        used = self.answer.used
+        largest = max(abs(s.mean) for s in used)
+
+        def told(s: Setting) -> tuple[str, str]:
+            is_none = abs(s.mean) < NOTHING * largest
+            return (f"about {self.value(0.0)}" if is_none else self.value(s.mean)), s.label
+
+        low, high = (told(f(used, key=lambda s: s.mean)) for f in (min, max))
+        if not self.is_scale or len(used) < 4:
+            return Span(low, high)
+        first = next(i for i, s in enumerate(used) if abs(s.mean) >= NOTHING * largest)
+        if 0 < first < len(used) - 1:
+            at = told(used[first]), told(used[-1])
+            return Span(low, high, used[first - 1].label, *at)
+        pairs = itertools.pairwise(used)
+        before, after = max(pairs, key=lambda pair: abs(pair[1].mean - pair[0].mean))
+        return Span(low, high, steepest=(before.label, after.label))
+
+
+def _shown(mean: float, half_width: float, digits: int, scale: float) -> str:
+    """A value with its margin, unless that is wider than what the value can be."""
+    is_wide = math.isfinite(scale) and half_width > min(_WIDEST * scale, abs(mean))
+    if not math.isfinite(half_width) or is_wide:
+        return number(mean, digits) if digits else f"{mean:.0f}"
+    return with_margin(mean, half_width)

@@ -1,0 +1,230 @@
+"""What to do next after a study: which lines of its file to change, and the command to run."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import dataclass
+
+from sandmould.definition.certificate import frequency_key
+from sandmould.definition.study import Study
+from sandmould.runs.formatting import filled_space, listed, name_of, value_text
+from sandmould.statistics.answer import Answer, Decided
+from sandmould.statistics.config import fewest_points
+from sandmould.statistics.optimum import Optimum
+from sandmould.statistics.robustness import Robustness
+from sandmould.statistics.verdict import FEW
+
+WORTH = 30
+"""More replicates than that of each setting are not worth the difference that they would show."""
+FINE_ENOUGH = 0.02
+"""Share of a value that sizes of elements or steps may leave open."""
+OWN_FILE = "my_study.yaml"
+TEXTS: Mapping[str, str] = {
+    "again": "See in the table of runs why {runs} did not finish. Once the cause is gone, compute "
+    "{them} again:",
+    "longer": "Shake for longer (duration_s): the {measure} was still getting better.",
+    "beyond": "Try {a_key} {side} {value}: the sweep ends there.",
+    "turn": "Turn the {space}, widen its mouth or vent it: shaking does not fill it.",
+    "chance": "Run every setting at least {runs} times: then chance can be told.",
+    "more": "Run about {runs} more fillings of each setting: they would tell {settings} apart.",
+    "choose": "Choose between {settings} by what suits your machine.",
+    "finer": "Halve the finest {key} once more: the error is {percent:.0f} % of the value.",
+    "cheapest": "Leave the {key} at its cheapest value.",
+    "frequencies": "Sweep {fewest} frequencies or more: with fewer the best one cannot be found "
+    "between them.",
+    "certificate": "Before you trust a frequency in Hz, test whether it goes with the model's "
+    "springs or with what the table holds:",
+    "settings": "Add settings to the sweep, or runs to each of them.",
+    "outside": "Add {a_key} {side} what was swept: the best may lie there.",
+    "rounds": "Go on with more rounds: the interval is not yet as narrow as asked.",
+    "hold": "State with hold what your table really holds, and sweep again.",
+    "time_step": "Repeat it with a smaller time step (time_step.fraction) until the optimum stays.",
+    "wave_speed": "Say how fast waves run in your sand: the best frequency goes with that.",
+    "try": "Nothing is left to compute: try it on the real machine.",
+    "sand": "Use the sand in a study of your own:",
+    "take_cheapest": "Take the cheapest of them: it gives the same.",
+    "differ": "See in the table of comparisons which differ, and which need more runs.",
+}  # fmt: skip
+
+
+@dataclass(frozen=True)
+class NextStep:
+    """One thing to do."""
+
+    text: str
+    line: str = ""
+    """What to write for it into the study's file."""
+    command: str = ""
+
+
+@dataclass(frozen=True)
+class NextSteps:
+    """All that is worth doing, the most useful first."""
+
+    steps: tuple[NextStep, ...]
+    before: str
+    """Which file the lines belong in; empty without lines."""
+    command: str
+    """What then computes them; empty without lines."""
+
+
+def step(name: str, line: str = "", command: str = "", **values: object) -> NextStep:
+    """A step by its name in ``TEXTS``."""
+    return NextStep(TEXTS[name].format(**values), line, command)
+
+
+def with_file(steps: Sequence[NextStep], owner: str | None, shipped: str, name: str) -> NextSteps:
+    """Say which file the lines of steps belong in.
+
+    Parameters
+    ----------
+    steps : sequence of NextStep
+    owner : str or None
+        The user's file of the study; None where nobody knows it.
+    shipped : str
+        Name of the shipped study that it is; empty where it is the user's.
+    name : str
+        Of the study.
+    """
+    file = OWN_FILE if shipped or owner is None else owner
+    below = f" a file {file} below based_on: {shipped or name}"
+    where = f"Write them into{below if file == OWN_FILE else f' {file}'}, then run"
+    has_lines = any(each.line for each in steps)
+    command = f"sandmould run {file}" if has_lines else ""
+    return NextSteps(tuple(steps), where if has_lines else "", command)
+
+
+def failed_steps(runs: Sequence[str]) -> list[NextStep]:
+    """What runs that did not finish ask for."""
+    if not runs:
+        return []
+    names = " ".join(runs) if len(runs) <= 2 else f"{runs[0]} ..."
+    one = len(runs) == 1
+    said, them = ("a run", "it") if one else (f"{len(runs)} runs", "them")
+    return [step("again", command=f"sandmould again {names}", runs=said, them=them)]
+
+
+def answer_steps(study: Study, answer: Answer) -> list[NextStep]:
+    """What the answer of a study asks for: never what is refused, or was computed.
+
+    Parameters
+    ----------
+    study : Study
+    answer : Answer
+    """
+    decided, key = answer.decided, name_of(answer.asked.keys[0]) if answer.asked.keys else ""
+    if decided is Decided.NO_RESULT:
+        return []
+    if decided in (Decided.NO_EFFECT, Decided.EQUAL):
+        return [step("cheapest", key=key)] if decided is Decided.NO_EFFECT else []
+    if decided is Decided.FINEST:
+        return _finer(answer)
+    steps = list(_chance(study, answer))
+    if answer.asked.better == "neither" or decided is Decided.REACHED:
+        return steps
+    if answer.longer_helps:
+        steps.append(step("longer", measure=name_of(answer.asked.measure)))
+    for end in answer.ends:
+        side = "above" if end.is_highest else "below"
+        value = value_text(end.key, end.value)
+        steps.append(step("beyond", a_key=_a(name_of(end.key)), side=side, value=value))
+    if decided is Decided.NONE_REACHES and not steps and study.objective.is_fill:
+        space = filled_space(answer.asked.measure).replace("_", " ")
+        steps.append(step("turn", space=space))
+    return steps
+
+
+def _chance(study: Study, answer: Answer) -> Iterable[NextStep]:
+    """More runs of each setting, where they would decide or tell chance at all."""
+    if not answer.asked.by_lot or answer.decided is Decided.REACHED:
+        return
+    fewest = min(s.n for s in answer.used)
+    if fewest < (2 if len(answer.used) > 1 and answer.asked.better != "neither" else FEW):
+        runs = max(FEW, study.replicates + (fewest >= FEW))
+        if runs > study.replicates:
+            yield step("chance", f"replicates: {runs}", runs=runs)
+        return
+    if answer.decided is not Decided.OPEN:
+        return
+    settings, more = listed([s.label for s in answer.alike]), answer.further_runs
+    if more is None or more > WORTH:
+        yield step("choose", settings=settings)
+        return
+    runs = max(1, more)
+    yield step("more", f"replicates: {study.replicates + runs}", runs=runs, settings=settings)
+
+
+def _finer(answer: Answer) -> list[NextStep]:
+    """A finer size, where those computed leave more open than is usually good enough."""
+    refining = answer.refining
+    assert refining is not None
+    share = refining.error / abs(refining.value) if refining.value else 0.0
+    if share <= FINE_ENOUGH:
+        return []
+    tree = f"{refining.sizes[-1] / 2:g}"
+    for part in reversed(refining.key.split(".")):
+        tree = f"{{{part}: {tree}}}"
+    return [step("finer", f"scenario: {tree}", key=name_of(refining.key), percent=100 * share)]
+
+
+def optimum_steps(
+    study: Study, optimum: Optimum | None, robustness: Robustness | None
+) -> list[NextStep]:
+    """What an optimum and its controls ask for.
+
+    Parameters
+    ----------
+    study : Study
+    optimum : Optimum, optional
+        None where too few runs tell it.
+    robustness : Robustness, optional
+        Its controls.
+    """
+    if optimum is None:
+        return [step("settings")]
+    steps = []
+    for key in optimum.keys:
+        if end := optimum.at_end(key):
+            side = {"lowest": "below", "highest": "above"}.get(end, "on both sides of")
+            steps.append(step("outside", a_key=_a(name_of(key)), side=side))
+    low_high = {key: optimum.interval(key) for key in study.refine.interval}
+    if any(high - low > study.refine.interval[k] for k, (low, high) in low_high.items()):
+        steps.append(step("rounds", f"refine: {{rounds: {study.refine.rounds + 2}}}"))
+    if robustness is None:
+        return steps
+    if robustness.cause == "held artefact":
+        steps.append(step("hold"))
+    elif robustness.cause == "numerics artefact":
+        steps.append(step("time_step"))
+    elif study.certificate.sand_wave_speed is None and robustness.follows_springs:
+        line = 'certificate: {sand_wave_speed: {low_m_s: ..., high_m_s: ..., by: "..."}}'
+        steps.append(step("wave_speed", line))
+    return steps
+
+
+def agreement_steps(is_sound: bool) -> list[NextStep]:
+    """What a comparison of settings that should agree asks for."""
+    return [step("take_cheapest" if is_sound else "differ")]
+
+
+def certificate_steps(study: Study, answer: Answer) -> list[NextStep]:
+    """The controls of a best frequency, where none were asked for."""
+    is_best = answer.best is not None and study.seeks_best
+    if not is_best or not frequency_key(study.sweep) or study.certificate.controls:
+        return []
+    fewest = fewest_points(1)
+    if study.sweep.number_of_points < fewest:
+        return [step("frequencies", fewest=fewest)]
+    return [step("certificate", "certificate: {controls: [springs, hold, time_step]}")]
+
+
+def sand_steps(study: Study, is_sound: bool) -> list[NextStep]:
+    """What a calibrated sand is good for."""
+    if not study.calibration.sands or not is_sound:
+        return []
+    return [step("sand", f"material: {study.calibration.sands[0].name}")]
+
+
+def _a(name: str) -> str:
+    """A name with its article."""
+    return f"an {name}" if name[0] in "aeio" else f"a {name}"

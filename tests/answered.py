@@ -1,0 +1,157 @@
+"""Tables of studies with the twelve questions that a report must answer rightly."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping, Sequence
+from typing import Any
+
+import numpy as np
+import pandas as pd
+
+from sandmould.scenario.drive import BoxDrive
+from sandmould.statistics.answer import Answer, Asked
+from sandmould.statistics.config import FULL_SHARE, Better, Goal
+from sandmould.statistics.decision import Evidence, decide
+
+HZ = "vibration.0.frequency_hz"
+G = "vibration.0.acceleration_g"
+MM = "vibration.0.displacement_m"
+FACTOR = "pattern.loop.factor"
+GUARD = "guard.kinetic_energy_factor"
+POCKET, HOLE = "pocket_fill_of_bed_fraction", "hole18_fill_of_bed_fraction"
+FILL, SHARE = "tube_fill_fraction", "tube_fill_of_bed_fraction"
+TIP = "pattern_tip_deflection_m"
+FREEZES = "solidification_time_s"
+Values = Mapping[Any, Sequence[float]]
+
+
+def table(key: str, **measures: Values) -> pd.DataFrame:
+    """A summary: a row a replicate of each value of a key."""
+    first = next(iter(measures.values()))
+    rows = [
+        {"run": f"r{n}_{r}", key: at, "replicate": r, "seed": r, "outcome_code": 0,
+         **{name: values[at][r] for name, values in measures.items()}}
+        for n, at in enumerate(first) for r in range(len(first[at]))
+    ]  # fmt: skip
+    return pd.DataFrame(rows)
+
+
+def over_a_second(summary: pd.DataFrame, rises: float, *measures: str) -> pd.DataFrame:
+    """Curves that rise by a share in the last quarter, or reach their end in a fifth of a second
+    over what they hold."""
+    rows = []
+    for run in summary.to_dict("records"):
+        for time_s in np.linspace(0.0, 1.0, 21):
+            shape = 1 - 4 * rises * (1 - time_s) / (1 + rises) if rises else min(1.0, 2 * time_s)
+            values = {name: run[name] * shape for name in measures}
+            row = {"run": run["run"], "time_s": time_s, "vibration_time_s": time_s}
+            rows.append({**row, "stage": "vibrate_1", **values})
+    return pd.DataFrame(rows)
+
+
+def answered(
+    summary: pd.DataFrame, measure: str, keys: Sequence[str], better: Better = "larger",
+    curves: pd.DataFrame | None = None, drives: Mapping[str, BoxDrive] | None = None,
+    by_lot: bool = True, stand_ins: tuple[str, ...] = (),
+) -> Answer:  # fmt: skip
+    """The answer of a study; what is a share of what fits should be full."""
+    space = measure.removesuffix("_fill_fraction").removesuffix("_fill_of_bed_fraction")
+    goal = Goal(f"{space}_fill_of_bed_fraction", FULL_SHARE) if better == "larger" else None
+    asked = Asked(measure, better, tuple(keys), goal, by_lot)
+    curves = pd.DataFrame() if curves is None else curves
+    return decide(asked, Evidence(summary, curves, drives or {}, stand_ins))
+
+
+AT_04_MM = {f"{hz} Hz": BoxDrive(hz, 4e-4) for hz in (30, 45, 60)}
+POCKETS = {30: (0.0, 0.0), 45: (0.016, 0.047), 60: (0.023, 0.096)}
+APART = {30: (0.01, 0.0, 0.0), 45: (0.04, 0.05, 0.03), 60: (0.10, 0.09, 0.11)}
+HOLES = {30: (0.97, 0.96, 0.98), 45: (0.90, 0.88, 0.91), 60: (0.87, 0.85, 0.84)}
+FULL = {30: (0.95, 0.96), 45: (0.97, 0.99), 60: (0.99, 1.0)}
+FILLS = {3.0: (0.4, 0.41, 0.42), 6.0: (0.56, 0.58, 0.57)}
+ELEMENTS = {0.005: (61.6,), 0.0025: (54.3,), 0.00125: (52.4,)}
+
+
+def none_reaches() -> Answer:
+    """A pocket that no frequency fills, still rising."""
+    summary = table(HZ, **{POCKET: POCKETS})
+    return answered(summary, POCKET, [HZ], curves=over_a_second(summary, 0.14, POCKET),
+                    drives=AT_04_MM)  # fmt: skip
+
+
+def several_reach() -> Answer:
+    """A pocket that every frequency fills, the higher the sooner."""
+    summary = table(HZ, **{POCKET: FULL})
+    return answered(summary, POCKET, [HZ], curves=over_a_second(summary, 0.0, POCKET),
+                    drives=AT_04_MM)  # fmt: skip
+
+
+def best_at_an_end() -> Answer:
+    """A bed that is denser the more it is shaken."""
+    fractions = {1.0: (0.50, 0.51, 0.52), 3.0: (0.54, 0.56, 0.55), 6.0: (0.60, 0.61, 0.63)}
+    return answered(table(G, solid_fraction=fractions), "solid_fraction", [G])
+
+
+def two_cavities() -> Answer:
+    """A pocket that does not fill, and a hole that fills where the pocket is emptiest."""
+    summary = table(HZ, **{POCKET: APART, HOLE: HOLES})
+    curves = over_a_second(summary, 0.14, POCKET, HOLE)
+    return answered(summary, POCKET, [HZ], curves=curves, drives=AT_04_MM)
+
+
+def one_value() -> Answer:
+    """How much of a hollow is full, by one run."""
+    summary = table(HZ, **{TIP: {50: (0.0123,)}}).drop(columns=HZ)
+    return answered(summary, TIP, [], "neither")
+
+
+def no_chance() -> Answer:
+    """Two castings, one run each."""
+    summary = table("exchange", **{FREEZES: {"faces": (2046.76,), "difference": (2050.1,)}})
+    return answered(summary, FREEZES, ["exchange"], "smaller", by_lot=False)
+
+
+def finest() -> Answer:
+    """Three regular sizes of elements."""
+    summary = table("element_m", **{FREEZES: ELEMENTS})
+    stand_ins = ("casting.density_kg_m3", "mould.conductivity_w_m_k")
+    return answered(summary, FREEZES, ["element_m"], "neither", by_lot=False, stand_ins=stand_ins)
+
+
+def no_effect() -> Answer:
+    """Sixteen runs that are four, four times over."""
+    fractions = dict.fromkeys((5, 6, 7, 8), (0.654, 0.679, 0.656, 0.668))
+    return answered(table(GUARD, solid_fraction=fractions), "solid_fraction", [GUARD])
+
+
+def smaller_while_rising() -> Answer:
+    """A tube that should stay empty and goes on filling."""
+    summary = table(G, **{FILL: FILLS})
+    return answered(summary, FILL, [G], "smaller", curves=over_a_second(summary, 0.09, FILL))
+
+
+def failing_loops() -> Answer:
+    """Of four loops two do not hold, one of them at the value 0."""
+    summary = table(FACTOR, **{TIP: {0.05: (0.011, 0.012), 1.0: (0.0, 0.09)}})
+    summary = summary.assign(pattern_loop=["holds", "holds", "cycles", "diverged"])
+    return answered(summary, TIP, [FACTOR], "smaller")
+
+
+def amplitude_swept() -> Answer:
+    """A tube that fills better at the larger of two amplitudes, and not wholly."""
+    fills = dict(zip((0.00015, 0.0006), FILLS.values(), strict=True))
+    shares = {at: tuple(v + 0.06 for v in own) for at, own in fills.items()}
+    drives = {"0.15 mm": BoxDrive(50.0, 1.5e-4), "0.6 mm": BoxDrive(50.0, 6e-4)}
+    return answered(table(MM, **{FILL: fills, SHARE: shares}), FILL, [MM], drives=drives)
+
+
+def too_wide() -> Answer:
+    """Two runs of each setting that differ by more than the settings."""
+    fractions = {25: (0.1, 0.5), 50: (0.3, 0.45), 75: (0.2, 0.6)}
+    return answered(table(HZ, solid_fraction=fractions), "solid_fraction", [HZ])
+
+
+QUESTIONS: Mapping[str, Callable[[], Answer]] = {
+    each.__name__: each
+    for each in (none_reaches, several_reach, best_at_an_end, two_cavities, one_value, no_chance,
+                 finest, no_effect, smaller_while_rising, failing_loops, amplitude_swept, too_wide)
+}  # fmt: skip

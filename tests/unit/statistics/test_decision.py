@@ -1,0 +1,163 @@
+"""The twelve questions that a report must answer rightly, each by what is decided of it."""
+
+from __future__ import annotations
+
+import math
+
+import pandas as pd
+import pytest
+
+from sandmould.statistics.answer import Decided
+from sandmould.statistics.over_time import first_reach_s
+from sandmould.statistics.refining import Refining, refining_of, resolution_among
+from tests import answered
+from tests.answered import FILL, FREEZES, HOLE, HZ, POCKET, TIP, G, table
+
+
+def labels(answer: answered.Answer) -> list[str]:
+    return [s.label for s in answer.reach]
+
+
+def test_no_setting_reaches_the_target() -> None:
+    found = answered.none_reaches()
+    assert found.decided is Decided.NONE_REACHES
+    assert found.is_sound
+    assert found.best is not None
+    assert (found.best.label, found.reach) == ("60 Hz", ())
+    assert found.shares["60 Hz"].mean == pytest.approx(0.0595)
+    assert found.still_changes == pytest.approx(0.14, abs=0.001)
+    assert found.longer_helps
+
+
+def test_several_reach_it_and_one_is_gentlest_another_shortest() -> None:
+    found = answered.several_reach()
+    assert found.decided is Decided.REACHED
+    assert labels(found) == ["30 Hz", "45 Hz", "60 Hz"]
+    assert found.shortest is not None
+    assert found.shortest.label == "60 Hz"
+    assert found.shortest_s == pytest.approx(0.5 * 0.95 / 0.995, abs=0.003)
+
+
+def test_the_best_at_an_end_is_no_best() -> None:
+    found = answered.best_at_an_end()
+    assert found.decided is Decided.BEST_AT_END
+    assert [(end.key, end.value, end.is_highest) for end in found.ends] == [(G, 6.0, True)]
+    turned = table(G, solid_fraction={1.0: (0.5, 0.51), 3.0: (0.62, 0.61), 6.0: (0.55, 0.54)})
+    inner = answered.answered(turned, "solid_fraction", [G])
+    assert (inner.decided, inner.ends) == (Decided.BEST, ())
+
+
+def test_two_cavities_are_judged_and_what_trades_against_what() -> None:
+    found = answered.two_cavities()
+    (hole,) = found.beside
+    assert (found.asked.measure, found.decided) == (POCKET, Decided.NONE_REACHES)
+    assert (hole.asked.measure, hole.decided, labels(hole)) == (HOLE, Decided.REACHED, ["30 Hz"])
+    assert found.wanted == ("60 Hz",)
+    assert found.trades
+    alike = table(HZ, **{POCKET: answered.APART, HOLE: answered.APART})
+    both = answered.answered(alike, POCKET, [HZ])
+    assert not both.trades
+    assert both.common == ("60 Hz",)
+
+
+def test_a_pattern_is_judged_beside_what_fills() -> None:
+    bent = {30: (0.002, 0.0021, 0.0022), 45: (0.003, 0.0031, 0.003), 60: (0.004, 0.0042, 0.004)}
+    summary = table(HZ, **{POCKET: answered.APART, TIP: bent})
+    (tip,) = answered.answered(summary, POCKET, [HZ]).beside
+    assert (tip.asked.measure, tip.asked.better, tip.wanted) == (TIP, "smaller", ("30 Hz",))
+
+
+def test_a_value_of_one_setting_is_a_value() -> None:
+    found = answered.one_value()
+    assert (found.decided, found.is_sound) == (Decided.VALUE, True)
+    assert found.used[0].mean == 0.0123
+    assert math.isnan(found.used[0].ci_half_width)
+
+
+def test_without_chance_one_run_each_decides() -> None:
+    found = answered.no_chance()
+    assert found.decided is Decided.BEST
+    assert found.best is not None
+    assert found.best.label == "exchange faces"
+    assert found.verdict.difference == pytest.approx(-3.34)
+    assert found.numerical_error is None
+    rows = [
+        {"run": f"{e}{h}", "exchange": e, "element_m": h, "outcome_code": 0, FREEZES: value}
+        for e, h, value in (("a", 0.01, 60.0), ("a", 0.005, 55.0), ("b", 0.01, 50.0),
+                            ("b", 0.005, 48.5))
+    ]  # fmt: skip
+    keys = ["exchange", "element_m"]
+    both = answered.answered(pd.DataFrame(rows), FREEZES, keys, "smaller", by_lot=False)
+    # finest against finest, 6.5 apart and open by 5 and 1.5
+    assert both.numerical_error == pytest.approx(6.5)
+    assert both.decided is Decided.OPEN
+
+
+def test_of_sizes_the_finest_answers_and_regular_ones_are_extrapolated() -> None:
+    found = answered.finest()
+    assert found.decided is Decided.FINEST
+    assert found.refining is not None
+    assert found.refining.sizes == (0.005, 0.0025, 0.00125)
+    gain = 7.3 / 1.9
+    assert found.refining.order == pytest.approx(math.log2(gain))
+    assert found.refining.value == pytest.approx(52.4 - 1.9 / (gain - 1))
+    assert found.refining.error == pytest.approx(1.9 / (gain - 1))
+    two = Refining("element_m", (0.0025, 0.00125), (61.56, 59.66))
+    assert (two.value, two.error) == (59.66, pytest.approx(1.9))
+    assert math.isnan(Refining("element_m", (4.0, 2.0, 1.0), (5.0, 6.0, 5.5)).order)
+    assert refining_of("time_step.fraction", [(0.8, 1.0), (0.798, 1.0)]) is None
+    assert resolution_among(["exchange", "element_m"]) == "element_m"
+
+
+def test_extrapolation_finds_the_limit_of_a_known_law() -> None:
+    sizes = (0.4, 0.2, 0.1)
+    law = Refining("element_m", sizes, tuple(3.0 + 2.0 * h**1.5 for h in sizes))
+    assert (law.order, law.value) == (pytest.approx(1.5), pytest.approx(3.0))
+
+
+def test_equal_bits_mean_that_a_key_changes_nothing() -> None:
+    assert answered.no_effect().decided is Decided.NO_EFFECT
+    same = dict.fromkeys((5, 6), (0.0, 0.0))
+    other = table(HZ, solid_fraction=same, bed_height_m={5: (0.1, 0.1), 6: (0.2, 0.1)})
+    assert answered.answered(other, "solid_fraction", [HZ]).decided is Decided.EQUAL
+
+
+def test_what_should_be_small_and_grows_is_helped_by_no_longer_shaking() -> None:
+    found = answered.smaller_while_rising()
+    assert found.still_changes > 0.08
+    assert not found.longer_helps
+
+
+def test_runs_whose_loop_does_not_hold_never_count() -> None:
+    found = answered.failing_loops()
+    assert [s.n for s in found.verdict.settings] == [2, 0]
+    assert found.left_out == {"cycles": 1, "diverged": 1}
+    assert found.used[0].mean == pytest.approx(0.0115)
+    none = table(HZ, **{TIP: {1: (0.0, 0.01)}}).assign(pattern_loop="lags")
+    assert answered.answered(none, TIP, [HZ]).decided is Decided.NO_RESULT
+
+
+def test_an_amplitude_is_told_by_its_drive() -> None:
+    found = answered.amplitude_swept()
+    assert found.decided is Decided.NONE_REACHES
+    assert found.drives["0.6 mm"].acceleration_g == pytest.approx(6.04, abs=0.01)
+
+
+def test_an_open_question_says_how_many_runs_would_decide() -> None:
+    found = answered.too_wide()
+    assert found.decided is Decided.OPEN
+    assert found.further_runs is not None
+    assert found.further_runs > 100
+    close = table(HZ, **{FILL: {25: (0.0, 0.0, 0.0), 50: (0.1, 0.2, 0.3)}})
+    assert answered.answered(close, FILL, [HZ]).further_runs == 2
+
+
+def test_nothing_lies_below_nothing() -> None:
+    rolling = table("friction", solid_fraction={0.0: (0.6, 0.61), 0.5: (0.5, 0.52)})
+    assert answered.answered(rolling, "solid_fraction", ["friction"]).decided is Decided.BEST
+
+
+def test_first_reach_is_interpolated() -> None:
+    assert first_reach_s([0, 1, 2, 3], [0, 0.4, 0.8, 0.7], 0.6) == pytest.approx(1.5)
+    assert first_reach_s([0, 1], [0.7, 0.8], 0.6) == 0
+    assert math.isnan(first_reach_s([0, 1, 2], [0, 0.4, 0.5], 0.6))

@@ -1,0 +1,59 @@
+"""The words of an answer: one golden text a question, and what no next step may ask."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import pytest
+
+from sandmould.kinds.sand.kind import SandStudy
+from sandmould.statistics.answer import Answer
+from sandmould.wording.answer import detail_sentences, first_sentence, limit_sentences
+from sandmould.wording.next_steps import NextStep, answer_steps
+from tests.answered import QUESTIONS
+
+GOLDEN = Path(__file__).parent / "golden"
+
+
+def steps(answer: Answer) -> list[NextStep]:
+    """What the study that asked would be told to do next."""
+    asked = {"measure": answer.asked.measure, "better": answer.asked.better}
+    return answer_steps(SandStudy.model_validate({"objective": asked}), answer)
+
+
+def text_of(name: str) -> str:
+    """All that is said of a question."""
+    answer = QUESTIONS[name]()
+    parts = {
+        "first": [first_sentence(answer)],
+        "details": detail_sentences(answer),
+        "limits": limit_sentences(answer),
+        "next": [f"{each.text} {each.line}".strip() for each in steps(answer)],
+    }
+    return "".join(f"{part}: {line}\n" for part, lines in parts.items() for line in lines)
+
+
+@pytest.mark.parametrize("name", QUESTIONS)
+def test_a_question_is_answered_in_these_words(name: str) -> None:
+    assert text_of(name) == (GOLDEN / f"{name}.txt").read_text(encoding="utf-8")
+
+
+@pytest.mark.parametrize("name", QUESTIONS)
+def test_no_answer_hides_behind_not_resolved_and_none_shows_metres(name: str) -> None:
+    said = text_of(name)
+    assert "not resolved" not in said.lower()
+    assert "0.0006" not in said
+
+
+@pytest.mark.parametrize(
+    ("name", "word"),
+    [
+        ("no_chance", "replicates"),  # nothing random there
+        ("finest", "element_m"),  # fine enough, and computed
+        ("smaller_while_rising", "onger"),
+        ("none_reaches", "hoose"),
+        ("no_effect", "replicates"),
+    ],
+)
+def test_no_step_is_refused_or_computed_or_harmful(name: str, word: str) -> None:
+    assert not [each for each in steps(QUESTIONS[name]()) if word in each.text + each.line]
