@@ -33,13 +33,10 @@ from sandmould.statistics.answer import Answer
 from sandmould.statistics.refining import resolution_among
 from sandmould.statistics.verdict import rank_runs
 from sandmould.study.collect import Collected
-from sandmould.study.plan.plan_files import read_run
 from sandmould.wording.next_steps import NextStep
 
 NEAR_PERCENT = 5.0
 """Off the reference's solidification time: as near as the answer takes for good."""
-STAND_IN = "stand-in"
-"""How the source of a value begins that is not what it stands for."""
 
 
 @dataclass(frozen=True)
@@ -75,7 +72,7 @@ def _pages(findings: Findings[Solidification], film_budget_bytes: int) -> KindPa
     fields, sentences, spots = _fields(folder, scenario)
     errors = _errors(reference, scenario, collected) if reference else []
     error_cost = _error_charts(errors)
-    stand_ins = _stand_ins(folder / "scenario.yaml")
+    stand_ins = _stand_ins(findings.answer.stand_ins)
     shown = {
         "pictured_run": run,
         "fields": fields,
@@ -118,10 +115,8 @@ def _run_of(summary: pd.DataFrame, answer: Answer) -> str:
     return rank_runs(summary, answer.asked.measure, answer.asked.better).get("best", "")
 
 
-def _stand_ins(path: Path) -> tuple[str, ...]:
-    """Which values are not what they stand for, by their sources."""
-    sources = read_run(path).sources if path.is_file() else {}
-    keys = [key for key, source in sources.items() if source.startswith(STAND_IN)]
+def _stand_ins(keys: Sequence[str]) -> tuple[str, ...]:
+    """Which values are not what they stand for."""
     if not keys:
         return ()
     names = [f"{key.rpartition('.')[0].replace('.', ' ')} {name_of(key)}" for key in keys]
