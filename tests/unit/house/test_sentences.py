@@ -20,8 +20,8 @@ LEFT = {
     "statistics/equivalence.py": 7,
 }
 """Files that still hold some, and how many: none is added, and what is moved is struck."""
-LEFT_OF_KINDS = 128
-"""Notes of plans, in the kinds."""
+LEFT_OF_KINDS = 126
+"""Notes of plans, in the kinds: at most so many."""
 
 
 def literals(text: str) -> Iterator[str]:
@@ -59,7 +59,7 @@ def test_statistics_hold_no_sentences_but_those_listed() -> None:
 
 
 def test_kinds_hold_no_more_sentences_than_they_did() -> None:
-    assert sum(counted("kinds").values()) == LEFT_OF_KINDS
+    assert sum(counted("kinds").values()) <= LEFT_OF_KINDS
 
 
 def test_a_sentence_is_found_and_a_docstring_or_a_key_is_not() -> None:
