@@ -112,6 +112,7 @@ def hill(**changes: Any) -> Scenario:
         "rest": {"rms_speed_m_s": 1e-3},
         "vibration": [{"acceleration_g": 1.5, "frequency_hz": 50.0, "duration_s": 0.06}],
         "record": {"snapshot_every_s": 0.02},
+        "time_step": {"bed_fraction": 0.0},
     }  # fmt: skip
     return Scenario.model_validate(base | changes)
 

@@ -51,6 +51,8 @@ def test_weight_of_a_bed_at_rest_is_the_load_on_floor_walls_and_obstacles(
         obstacles=[{**plate, "angle_deg": 20}] if dimension == 3 else [wedge],
         contact=SOFT if dimension == 3 else {},
         fill={"layers": [{"count": 40}], "settling": {"longest_s": 4.0}},
+        # with 0.5 spheres tremble on at 1e-4 m/s, on the reference engine too
+        time_step={"fraction": 0.35 if dimension == 3 else 0.5},
         rest={"rms_speed_m_s": 1e-4},
         vibration=[],
     )
