@@ -51,8 +51,7 @@ def engines_and_step() -> Method:
     """Three engines over the step, on an impact, a heap and a tube."""
     heap, tube = Record("repose_time_step", ANGLE), Record("engine_twins", FILL)
     steps = heap.points([STEP], heap.least(STEP), lambda key: ("reference", f"{key[0]:g}"))
-    ours = tube.where(ENGINE, "reference")
-    engines = tube.points([ENGINE], ours, lambda key: (key[0], ""), 0.01)
+    engines = tube.points([ENGINE], tube.where(ENGINE, "reference"), lambda key: (key[0], ""), 0.01)
     panels = [
         impacts("one impact", lambda row: row["engine"] * (row["dashpot"] == "corrected")),
         Panel("heap of 2 676 discs, over the step", ANGLE_ERROR, steps, [heap.page]),
