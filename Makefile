@@ -17,7 +17,7 @@ LINT := lint-style lint-types lint-imports lint-rules lint-names
 .DEFAULT_GOAL := help
 .PHONY: help install demo study plan status report quick fast-tests test all-tests other-python lint $(LINT) architecture decks schema lock lock-check results-check results-pages docs clean
 .PHONY: twins verification stability rebound size-ratio lammps-decks at-rest core-loop size reliability fuzz benchmarks peers scaling solidification flow \
-  reproduction
+  reproduction speed-accuracy
 
 help:
 	@echo 'make TARGET [STUDY=config/studies/tube_frequency.yaml] [CORES=2]'
@@ -134,6 +134,10 @@ reliability: $(INSTALLED)
 ## damaged files for every reader, MINUTES long
 fuzz: $(INSTALLED)
 	@$(BIN)/python -m tests.fuzz.campaign --minutes $(MINUTES)
+
+## error over core time of every method, from committed results: docs/speed_and_accuracy.md
+speed-accuracy: $(INSTALLED)
+	@$(BIN)/python -m benchmarks.speed_and_accuracy
 
 ## how fast the engines are: docs/developers/speed.md
 benchmarks: $(INSTALLED)

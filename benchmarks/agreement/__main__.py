@@ -1,13 +1,12 @@
 """The pages on studies whose settings should agree, from the committed results.
 
 ``python -m benchmarks.agreement`` writes docs/engine_twins.md and
-docs/developers/repose_settings.md;
-``make twins`` computes and records the studies of the first before.
+docs/one_difference.md; ``make twins`` computes and records the studies of the first before.
 """
 
 from __future__ import annotations
 
-from benchmarks.agreement import engine_twins, repose_settings
+from benchmarks.agreement import engine_twins
 from benchmarks.frame import Benchmark
 
 BENCHMARK = Benchmark(
@@ -16,7 +15,6 @@ BENCHMARK = Benchmark(
     pages={
         "engine_twins.md": lambda results: engine_twins.page(),
         "one_difference.md": lambda results: engine_twins.one_difference(),
-        "developers/repose_settings.md": lambda results: repose_settings.page(),
     },
 )
 

@@ -13,7 +13,7 @@ from benchmarks.arpm.charts import draw
 from benchmarks.arpm.contact import contact_rows
 from benchmarks.arpm.fields import draw_fields
 from benchmarks.arpm.limits import jump_rows, scatter_rows, step_rows
-from benchmarks.arpm.page import all_ways, failures, page
+from benchmarks.arpm.page import failures, page
 from benchmarks.arpm.space import REFERENCE_MM, space_rows
 from benchmarks.arpm.ways import way_rows
 from benchmarks.frame import Benchmark, BenchmarkRun
@@ -73,7 +73,6 @@ BENCHMARK = Benchmark(
     },
     pages={
         "solidification.md": page,
-        "developers/solidification_ways.md": all_ways,
         "developers/solidification_limits.md": failures,
     },
     draw=draw,

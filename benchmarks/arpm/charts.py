@@ -7,14 +7,12 @@ from pathlib import Path
 from typing import Any
 
 import matplotlib
-from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
-from benchmarks.arpm.ways import FEM, PAPERS
+from benchmarks.arpm.ways import PAPERS
 
 matplotlib.use("Agg")
 CASES = ("1-1", "1-2", "1-3", "1-4", "1-3A", "1-3B")
-COMPETITORS = ("finite differences", FEM)
 SMALLEST_COURSE_MM = 2.0
 """Courses of one size are shown from here up, as finer ones lie on the axis."""
 Row = Mapping[str, Any]
@@ -22,37 +20,9 @@ Row = Mapping[str, Any]
 
 def draw(results: Mapping[str, Any], folder: Path) -> None:
     """Draw all pictures that need no computation."""
-    contact, ways, space = (results[part]["rows"] for part in ("contact", "ways", "space"))
-    draw_ways(ways, space, folder / "solidification.png")
+    contact, ways = results["contact"]["rows"], results["ways"]["rows"]
     draw_courses(ways, folder / "solidification_courses.png")
     draw_contact(contact, folder / "solidification_contact.png")
-
-
-def draw_ways(ways: Sequence[Row], space: Sequence[Row], path: Path) -> None:
-    """Mean error where the casting is thinnest over the processor's time, in 2D and 3D."""
-    figure = Figure(figsize=(13, 5.6), layout="constrained")
-    plane, solid = figure.subplots(1, 2)
-    _draw_cost(plane, ways[1:], "A")
-    _draw_cost(solid, space[1:], "plate")
-    plane.set_title("four plates in 2D, at A")
-    solid.set_title("block with a plate in 3D, in the plate")
-    figure.savefig(path, dpi=120)
-
-
-def _draw_cost(panel: Axes, rows: Sequence[Row], probe: str) -> None:
-    colours = matplotlib.colormaps["tab20"]
-    for place, name in enumerate(dict.fromkeys(r["way"] for r in rows)):
-        own = [r for r in rows if r["way"] == name]
-        rival = name in COMPETITORS
-        panel.loglog(
-            [r["cpu_s"] for r in own], [r["mean_error_percent"][probe] for r in own],
-            marker="osD^vP*X<>hpd8"[place], color="black" if rival else colours(place),
-            ls="--" if rival else "-", lw=1.2, ms=5, label=name,
-        )  # fmt: skip
-    panel.set_xlabel("processor time, s")
-    panel.set_ylabel("mean error of the cooling curve, % of 1530 K")
-    panel.grid(alpha=0.3, which="both")
-    panel.legend(fontsize=7)
 
 
 def draw_courses(ways: Sequence[Row], path: Path) -> None:
@@ -62,7 +32,7 @@ def draw_courses(ways: Sequence[Row], path: Path) -> None:
     """
     figure = Figure(figsize=(13, 4.4), layout="constrained")
     times, curves, drifts = figure.subplots(1, 3)
-    for name in (PAPERS[0], COMPETITORS[0]):
+    for name in (PAPERS[0], "finite differences"):
         own = sorted((r for r in ways if r["way"] == name), key=lambda r: float(r["size_mm"]))
         times.plot([r["size_mm"] for r in own], [r["solidification_time_s"] for r in own],
                    marker="o", label=name)  # fmt: skip

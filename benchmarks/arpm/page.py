@@ -6,20 +6,15 @@ from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any, NamedTuple
 
-from benchmarks.arpm.charts import CASES, COMPETITORS
+from benchmarks.arpm.charts import CASES
 from benchmarks.arpm.ways import PAPERS
 from benchmarks.frame import render
 
 PAPERS_SIZES_MM = (10.0, 5.0, 4.0, 2.5, 2.0, 1.0)
-UNIFORM = (PAPERS[0], 2.0)
-"""The paper's standard of accuracy, and what is to beat it."""
-ADAPTIVE = ("2-3B, faces, local steps", 2.0)
-KERNELS, LOCAL = (PAPERS[0], 1.0), ("uniform, faces, local steps", 1.0)
 KERNEL_SIZES = (1.4, 2.4, 3.2, 4.2)
 """Of the contact cases in tables; the picture has all."""
 JUMP_SIZES = (1.4, 2.1, 4.2)
 """Kernels of the jumps of sizes in the table."""
-LIMITS_PERCENT = (2.0, 1.0, 0.5, 0.2, 0.1)
 Row = Mapping[str, Any]
 
 
@@ -31,39 +26,22 @@ class Pivot(NamedTuple):
 
 
 def page(results: Mapping[str, Any]) -> str:
-    """Write the page on which way to take.
+    """Write the page on the casting with four plates.
 
     Parameters
     ----------
     results : mapping
         What ``benchmarks.arpm`` measured.
     """
-    ways, space = (results[part]["rows"] for part in ("ways", "space"))
-    rows = {(r["way"], r["size_mm"]): r for r in reversed(ways)}
+    ways = results["ways"]["rows"]
     return render(Path(__file__).with_name("page.md.j2"), {
         "papers": PAPERS,
-        "worst": worst,
-        "duels_of": duels_of,
         "ways": ways,
-        "space": space,
-        "uniform": rows[UNIFORM], "adaptive": rows[ADAPTIVE], "kernels": rows[KERNELS],
-        "local": rows[LOCAL],
         "papers_rows": [
             r for r in ways if r["way"] in PAPERS and r["size_mm"] in PAPERS_SIZES_MM
         ],
         "origins": {name: part for name, part in results.items() if "solver" in part},
     })  # fmt: skip
-
-
-def all_ways(results: Mapping[str, Any]) -> str:
-    """Write the tables of all ways.
-
-    Parameters
-    ----------
-    results : mapping
-    """
-    tables = {part: results[part]["rows"] for part in ("ways", "space")}
-    return render(Path(__file__).with_name("ways.md.j2"), tables)
 
 
 def failures(results: Mapping[str, Any]) -> str:
@@ -92,46 +70,6 @@ def failures(results: Mapping[str, Any]) -> str:
         ),
         "scatter": pivot(limits["scatter"], ("exchange",), "scatter", "largest_k"),
     })  # fmt: skip
-
-
-def worst(row: Row) -> float:
-    """The larger of the mean error at the worst probe and that of the solidification time, %."""
-    return max(*row["mean_error_percent"].values(), abs(float(row["time_error_percent"])))
-
-
-def cheapest(rows: Sequence[Row], error_percent: float, are_rivals: bool) -> Row | None:
-    """The least costly of the rows that are no worse than an error; None if none is.
-
-    Parameters
-    ----------
-    rows : sequence of rows
-        The reference left out.
-    error_percent : float
-    are_rivals : bool
-        Whether to look among finite differences and scikit-fem, or among elements.
-    """
-    good = [
-        r for r in rows if worst(r) <= error_percent and (r["way"] in COMPETITORS) == are_rivals
-    ]
-    return min(good, key=lambda r: float(r["cpu_s"]), default=None)
-
-
-def duels_of(rows: Sequence[Row]) -> list[dict[str, Any]]:
-    """The cheapest elements and the cheapest competitor at several accuracies.
-
-    Parameters
-    ----------
-    rows : sequence of rows
-        The reference first.
-    """
-    duels = []
-    for limit in LIMITS_PERCENT:
-        elements, rival = (cheapest(rows[1:], limit, are_rivals) for are_rivals in (False, True))
-        if elements is not None and rival is not None:
-            times = float(rival["cpu_s"]) / float(elements["cpu_s"])
-            duels.append({"limit_percent": limit, "elements": elements, "rival": rival,
-                          "times": times})  # fmt: skip
-    return duels
 
 
 def pivot(rows: Sequence[Row], by: Sequence[str], over: str, value: str) -> Pivot:

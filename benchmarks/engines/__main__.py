@@ -1,7 +1,7 @@
 """Speed of the engines side by side, and of the reference engine against its targets.
 
-``make benchmarks`` runs ``python -m benchmarks.engines``, which writes docs/developers/speed.md and
-docs/developers/speed.png. Nothing else should run on the machine meanwhile.
+``make benchmarks`` runs ``python -m benchmarks.engines``, which writes docs/developers/speed.md.
+Nothing else should run on the machine meanwhile.
 """
 
 from __future__ import annotations
@@ -12,7 +12,6 @@ from typing import Any
 
 from benchmarks.engines.accuracy import measure_accuracy
 from benchmarks.engines.beds import settled
-from benchmarks.engines.chart import draw
 from benchmarks.engines.machine import machine
 from benchmarks.engines.page import page
 from benchmarks.engines.rates import measure_bed
@@ -58,7 +57,6 @@ BENCHMARK = Benchmark(
         "accuracy": lambda run: measure_accuracy(run.results["rates"][0], run.extent),
     },
     pages={"developers/speed.md": page},
-    draw=lambda results, folder: draw(results, folder / "developers" / "speed.png"),
     extent=Extent(),
     quick=QUICK,
     arrange=arrange,

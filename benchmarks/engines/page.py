@@ -10,14 +10,6 @@ from benchmarks.engines.scale import SCALE_TARGET, THREADS_TARGET
 from benchmarks.frame import render
 
 
-def _gflop_s(ns_per_flop: dict[str, float]) -> dict[str, float]:
-    """Rates of operations from their times, with their range."""
-    return {
-        name: 1.0 / ns_per_flop[time]
-        for name, time in (("median", "median"), ("least", "most"), ("most", "least"))
-    }
-
-
 def page(results: dict[str, Any]) -> str:
     """Write the page.
 
@@ -26,12 +18,10 @@ def page(results: dict[str, Any]) -> str:
     results : dict
         What ``benchmarks.engines`` measured.
     """
-    peaks = results["roofline"]["peaks"]
     return render(Path(__file__).with_name("page.md.j2"), {
         **results,
         "ratio_targets": TARGETS,
         "threads_target": THREADS_TARGET,
         "scale_target": SCALE_TARGET,
         "missing": {n: text for row in results["rates"] for n, text in row["missing"].items()},
-        "gflop_s": {kind: _gflop_s(peaks[f"{kind}_ns_per_flop"]) for kind in ("scalar", "vector")},
     })  # fmt: skip

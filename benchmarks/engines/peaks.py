@@ -74,14 +74,6 @@ def _quotients(x: Floats, times: int) -> float:
     return a + b
 
 
-@njit(error_model="numpy")
-def _chain(x: float, times: int) -> float:
-    """A square root and a division, each waiting for the one before."""
-    for _ in range(times):
-        x = 1.0 / math.sqrt(x)
-    return x
-
-
 def bandwidth(total_bytes: int, rounds: int, block_s: float = 0.05) -> dict[str, float]:
     """GB/s of the triad over three arrays of so many bytes together, 24 bytes counted a number."""
     n = max(64, total_bytes // 24)
@@ -123,7 +115,6 @@ def measure_peaks(rounds: int, times: int) -> dict[str, Any]:
         ),
         "ns_per_root": block(lambda: _roots(x, times), numbers),
         "ns_per_quotient": block(lambda: _quotients(x, times), numbers),
-        "ns_per_chained_root_and_quotient": block(lambda: _chain(1.25, numbers), numbers),
     }
     peaks = {name: spread(values) for name, values in interleaved(blocks, rounds).items()}
     return {**peaks, "vector_bits": vector_bits()}

@@ -115,10 +115,3 @@ def measure_phases(
         "parts": {name: spread(part) for name, part in zip(names, parts.tolist(), strict=True)},
         "within_pairs": {name: spread(part.tolist()) for name, part in within.items()},
     }
-
-
-def measure_listing(solver: Solver, rounds: int) -> dict[str, float]:
-    """Time of one listing of near pairs and near surfaces, ns per grain."""
-    nowhere = np.zeros(solver.dimension)
-    n = len(solver.grains.id)
-    return spread([1e9 * seconds(lambda: solver._list(nowhere)) / n for _ in range(rounds)])

@@ -6,7 +6,7 @@ from typing import Any
 
 from benchmarks.engines.beds import Bed, settled, solver_on, tiled
 from benchmarks.engines.peaks import bandwidth, measure_peaks
-from benchmarks.engines.phases import measure_listing, measure_phases
+from benchmarks.engines.phases import measure_phases
 from benchmarks.engines.scale import advance, bytes_of, cost_of, near_of
 from benchmarks.engines.timing import Extent, one_core, spread, steps_lasting
 from sandmould.dem.solver import Solver
@@ -38,8 +38,6 @@ ROOTS_PER_CONTACT = {2: 1, 3: 3}
 """Distance, and two limits in 3D; each is followed by a quotient."""
 QUOTIENTS_PER_GRAIN = 2
 """dt/m and dt/I."""
-CHAINED_PER_CONTACT = {2: 1, 3: 2}
-"""Of these, what waits for each other: distance, then the limit of friction."""
 TRAFFIC = {
     "grains position": 1, "grains velocity": 1, "grains spin": 1, "grains kind": 1,
     "grains force": 2, "grains moment": 2, "ahead": 2, "near grain": 1, "near first_row": 1,
@@ -91,21 +89,18 @@ def _times(bed: Bed, extent: Extent, phases: bool) -> tuple[Solver, dict[str, An
     still = solver_on(bed)
     block_s /= 10
     step = cost_of(solver, steps_lasting(lambda n: advance(solver, n), block_s))
-    listing = measure_listing(still, extent.rounds)
-    phase_times = measure_phases(still, step, 3 * extent.rounds, block_s)
-    return solver, phase_times | {"listing_ns_per_grain": listing}
+    return solver, measure_phases(still, step, 3 * extent.rounds, block_s)
 
 
 def _measure_bed(bed: Bed, peaks: dict[str, Any], extent: Extent, phases: bool) -> dict[str, Any]:
     """Time of a step against its limits."""
     solver, times = _times(bed, extent, phases)
-    step_ns, pairs = times["ns_per_grain_step"]["median"], solver.moving.pairs
-    listed, contacts = 0.5 * len(pairs.other) / bed.grains, len(solver.contacts.first) / bed.grains
+    step_ns = times["ns_per_grain_step"]["median"]
+    contacts = len(solver.contacts.first) / bed.grains
     near = near_of(solver) / bed.grains
     held = sum(size for name, size in bytes_of(solver).items() if name in TRAFFIC)
     gb_s = bandwidth(held, extent.rounds)
     bounds = _bounds(solver, contacts, near, peaks, gb_s["median"])
-    chained_ns = peaks["ns_per_chained_root_and_quotient"]["median"]
     return {
         "bed": bed.name,
         "dimension": bed.dimension,
@@ -113,12 +108,10 @@ def _measure_bed(bed: Bed, peaks: dict[str, Any], extent: Extent, phases: bool) 
         "gb_s": gb_s,
         "bytes_per_grain_step": traffic_bytes(solver),
         "flops_per_grain_step": flops(bed.dimension, near, contacts),
-        "listed_per_grain": listed,
         "near_per_grain": near,
         "contacts_per_grain": contacts,
         "bounds_ns": bounds,
         "fractions": {name: ns / step_ns for name, ns in bounds.items()},
-        "waiting_ns": contacts * CHAINED_PER_CONTACT[bed.dimension] * chained_ns,
         **times,
     }
 

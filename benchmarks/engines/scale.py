@@ -110,17 +110,6 @@ def bytes_of(solver: Solver) -> dict[str, int]:
     return sizes | {name: array.nbytes for name, array in others.items()}
 
 
-def _memory(solver: Solver) -> dict[str, Any]:
-    """Bytes per grain array by array, and what they depend on."""
-    n, pairs = len(solver.grains.id), solver.moving.pairs
-    return {
-        "grains": n,
-        "listed_per_grain": 0.5 * len(pairs.other) / n,
-        "contacts_per_grain": len(solver.contacts.first) / n,
-        "bytes_per_grain": {name: size / n for name, size in bytes_of(solver).items()},
-    }
-
-
 def _measure_sizes(tile: Bed, sizes: tuple[int, ...], extent: Extent) -> dict[str, Any]:
     """Cost per grain-step of beds of several sizes, on one core."""
     solvers = {str(n): solver_on(tiled(tile, n)) for n in sizes}
@@ -133,8 +122,6 @@ def _measure_sizes(tile: Bed, sizes: tuple[int, ...], extent: Extent) -> dict[st
         "sizes": list(sizes),
         "ns_per_grain_step": costs,
         "dearest_over_cheapest": max(medians) / min(medians),
-        "largest_over_smallest": ratio(costs_by_size[str(sizes[-1])], costs_by_size[str(sizes[0])]),
-        "memory": [_memory(solver) for solver in solvers.values()],
     }
 
 

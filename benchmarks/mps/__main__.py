@@ -1,7 +1,7 @@
 """Metal flow by particles: noise against cost of the schemes, the solver's share, size, peers.
 
-``make flow`` runs ``python -m benchmarks.mps``, which writes docs/metal_flow.md and its picture;
-with ``--quick`` runs last 0.3 s. The parts ``solvers`` and ``peers`` need an environment of their
+``make flow`` runs ``python -m benchmarks.mps``, which writes docs/metal_flow.md; with ``--quick``
+runs last 0.3 s. The parts ``solvers`` and ``peers`` need an environment of their
 own, ``.venv-peers-flow``, which ``make flow`` makes.
 """
 
@@ -10,7 +10,7 @@ from __future__ import annotations
 from typing import Any
 
 from benchmarks.frame import Benchmark, BenchmarkRun
-from benchmarks.mps.page import RECOMMENDED, draw, page
+from benchmarks.mps.page import RECOMMENDED, page
 from benchmarks.mps.peers import peer_rows
 from benchmarks.mps.runs import SCHEMES, large_row, scheme_rows
 from benchmarks.mps.solvers import solver_rows
@@ -58,7 +58,6 @@ BENCHMARK = Benchmark(
         "peers": peers,
     },
     pages={"metal_flow.md": page},
-    draw=draw,
     extent=LONG_S,
     quick=SHORT_S,
 )

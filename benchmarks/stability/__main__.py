@@ -1,7 +1,7 @@
 """Where each engine loses stability: a map over time step and damping, and the exact limits.
 
-``make stability`` runs ``python -m benchmarks.stability``, which writes docs/stability.md with its
-picture.
+``make stability`` runs ``python -m benchmarks.stability``, which writes docs/stability.md and
+docs/developers/longer_steps.md.
 """
 
 from __future__ import annotations
@@ -22,7 +22,7 @@ from benchmarks.stability.limits import (
     one_contact_s,
     rotation,
 )
-from benchmarks.stability.page import draw, longer_steps, page
+from benchmarks.stability.page import longer_steps, page
 from benchmarks.stability.scenes import SCENES, limits_of, start_of
 
 
@@ -66,7 +66,6 @@ BENCHMARK = Benchmark(
         ],
     },
     pages={"stability.md": page, "developers/longer_steps.md": longer_steps},
-    draw=draw,
     extent=WHOLE,
     quick=COARSE,
     arrange=arrange,

@@ -1,46 +1,21 @@
-"""The picture and the page of the stability map."""
+"""The pages on stability."""
 
 from __future__ import annotations
 
 from pathlib import Path
 from typing import Any
 
-import matplotlib
-
-matplotlib.use("Agg")
-import matplotlib.pyplot as plt
 import numpy as np
-from matplotlib.axes import Axes
-from matplotlib.colors import ListedColormap
-from matplotlib.lines import Line2D
-from matplotlib.patches import Patch
 
 from benchmarks.frame import render
-from benchmarks.stability.runs import BLOWS_UP, DRIFTS, STABLE
+from benchmarks.stability.runs import BLOWS_UP
 
-OUTCOMES = (STABLE, DRIFTS, BLOWS_UP)
-COLOURS = ("#a6d4ee", "#f0b429", "#b5401c")
-"""Apart in lightness too, so that they differ without colour."""
 TITLES = {
     "contact": "one grain on the floor",
     "column": "column of {grains} grains",
     "bed": "settled bed of {grains} discs",
 }
 ENGINE_TITLES = {"reference": "reference", "lammps": "LAMMPS", "liggghts": "LIGGGHTS"}
-_LABELS = {
-    "without": "(41), no damping: $2/\\omega_{max}$",
-    "one": "(42) with $\\xi=\\zeta$",
-    "whole": "(42) for the whole system, computed from its contacts",
-    "planned": "planned step of a study (fraction 1)",
-    "measured": "largest stable step, measured",
-}
-_LINES: dict[str, dict[str, Any]] = {
-    "without": {"color": "black", "lw": 1.2, "ls": ":"},
-    "one": {"color": "black", "lw": 1.4, "ls": (0, (5, 2))},
-    "whole": {"color": "black", "lw": 2.2},
-    "planned": {"color": "#1b5e20", "lw": 1.8, "ls": (0, (6, 2, 1, 2))},
-    "measured": {"color": "black", "marker": "o", "mfc": "white", "ms": 6, "ls": "none"},
-}
 
 
 def of_one_mode(damping_ratio: Any) -> Any:
@@ -48,65 +23,14 @@ def of_one_mode(damping_ratio: Any) -> Any:
     return np.sqrt(1 + np.square(damping_ratio)) - damping_ratio
 
 
-def _edges(centres: list[float], low: float, high: float) -> np.ndarray:
-    middle = (np.array(centres[1:]) + centres[:-1]) / 2
-    return np.concatenate([[low], middle, [high]])
-
-
-def _panel(axes: Axes, results: dict[str, Any], scene: dict[str, Any], engine: str) -> None:
-    rows = scene["maps"][engine]
-    zeta = [row["damping_ratio"] for row in rows]
-    codes = np.array([[OUTCOMES.index(o) for o in row["outcomes"]] for row in rows])
-    axes.pcolormesh(
-        _edges(results["steps_over_critical"], 0.0, 2.2),
-        _edges(zeta, -0.06, 1.06),
-        codes,
-        cmap=ListedColormap(COLOURS),
-        vmin=-0.5,
-        vmax=2.5,
-        edgecolors="white",
-        linewidth=0.4,
+def _largest_error(results: dict[str, Any]) -> float:
+    """Largest deviation of a measured limit from the exact one, relative."""
+    return max(
+        abs(row["largest_stable_over_critical"] * scene["critical_s"] / limits["whole_s"] - 1)
+        for scene in results["scenes"].values()
+        for rows in scene["maps"].values()
+        for limits, row in zip(scene["limits"], rows, strict=True)
     )
-    critical_s = scene["critical_s"]
-    fine = np.linspace(0, 1, 101)
-    axes.axvline(1.0, **_LINES["without"])
-    axes.plot(of_one_mode(fine), fine, **_LINES["one"])
-    for name in ("whole", "planned"):
-        steps = [row[f"{name}_s"] / critical_s for row in scene["limits"]]
-        axes.plot(steps, zeta, **_LINES[name])
-    axes.plot([row["largest_stable_over_critical"] for row in rows], zeta, **_LINES["measured"])
-    axes.set_xlim(0, 2.2)
-    axes.set_ylim(-0.06, 1.06)
-    axes.set_xticks([0, 0.5, 1, 1.5, 2])
-    axes.set_yticks([0, 0.25, 0.5, 0.75, 1])
-
-
-def draw(results: dict[str, Any], folder: Path) -> None:
-    """Draw one panel for each scene and engine."""
-    scenes, engines = results["scenes"], list(results["engines"])
-    plt.rcParams.update({"font.size": 10, "axes.titlesize": 11, "mathtext.fontset": "dejavusans"})
-    figure, panels = plt.subplots(
-        len(scenes), len(engines), figsize=(3.6 * len(engines) + 0.6, 9.6),
-        sharex=True, sharey=True, squeeze=False,
-    )  # fmt: skip
-    for i, (name, scene) in enumerate(scenes.items()):
-        for j, engine in enumerate(engines):
-            _panel(panels[i, j], results, scene, engine)
-            if i == 0:
-                panels[i, j].set_title(ENGINE_TITLES[engine], fontweight="bold")
-        title = TITLES[name].format(grains=scene["grains"])
-        panels[i, 0].set_ylabel(f"{title}\n\ndamping ratio $\\zeta$ (1)")
-    for axes in panels[-1]:
-        axes.set_xlabel("time step over that of (41) (1)")
-    handles: list[Any] = [
-        Patch(facecolor=c, edgecolor="grey", label=o)
-        for c, o in zip(COLOURS, OUTCOMES, strict=True)
-    ]
-    handles += [Line2D([], [], label=_LABELS[name], **style) for name, style in _LINES.items()]
-    figure.legend(handles=handles, loc="lower center", ncols=3, frameon=False, handlelength=2.8)
-    figure.tight_layout(rect=(0, 0.09, 1, 1), h_pad=1.2, w_pad=1.0)
-    figure.savefig(folder / "stability.png", dpi=110, metadata={"Software": None})
-    plt.close(figure)
 
 
 def _first_blow_up(results: dict[str, Any], scene: str) -> str:
@@ -120,16 +44,6 @@ def _first_blow_up(results: dict[str, Any], scene: str) -> str:
         if outcome == BLOWS_UP
     ]
     return f"{min(ratios):.2f}" if ratios else "none"
-
-
-def _largest_error(results: dict[str, Any]) -> float:
-    """Largest deviation of a measured limit from the exact one, relative."""
-    return max(
-        abs(row["largest_stable_over_critical"] * scene["critical_s"] / limits["whole_s"] - 1)
-        for scene in results["scenes"].values()
-        for rows in scene["maps"].values()
-        for limits, row in zip(scene["limits"], rows, strict=True)
-    )
 
 
 def _agreement(results: dict[str, Any]) -> list[bool]:

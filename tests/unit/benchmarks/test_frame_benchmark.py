@@ -15,7 +15,8 @@ from sandmould import ROOT
 
 PAGED = (
     "agreement", "arpm", "at_rest", "calibration", "core_loop", "engines", "lammps_decks", "mps",
-    "prices", "rebound", "reliability", "scaling", "size", "size_ratio", "stability", "sweeps",
+    "prices", "rebound", "reliability", "scaling", "size", "size_ratio", "speed_and_accuracy",
+    "stability", "sweeps",
 )  # fmt: skip
 SLOWLY_PAGED = ("frequency_law", "reproduction")
 WRITTEN = (

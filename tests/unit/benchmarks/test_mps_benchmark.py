@@ -2,12 +2,11 @@
 
 from __future__ import annotations
 
-from pathlib import Path
 from typing import Any
 
 import pytest
 
-from benchmarks.mps.page import comparisons, draw, page
+from benchmarks.mps.page import page
 from benchmarks.mps.peers import measured
 from benchmarks.mps.solvers import poisson_of, rows_here
 from sandmould.casting.mps.scheme import Scheme
@@ -23,22 +22,6 @@ def row(scheme: str, relaxations: int, cost: float, noise: float, **more: Any) -
     } | more  # fmt: skip
 
 
-def test_several_relaxations_are_worth_it_where_no_cheaper_single_solve_is_calmer() -> None:
-    several, single = row("MR5-0.5", 5, 4.0, 20.0), row("MR1-0.5", 1, 3.0, 50.0)
-    assert comparisons([several, single]) == [
-        {"several": several, "single": single, "is_worth": True}
-    ]
-    calmer = row("divergence", 1, 4.0, 10.0)
-    assert comparisons([several, single, calmer]) == [
-        {"several": several, "single": calmer, "is_worth": False}
-    ]
-    # one that costs more, or that a guard stopped, does not compete
-    for rival in ({"cpu_s_per_simulated_s": 4.1}, {"stopped": "it diverged"}):
-        (compared,) = comparisons([several, single, calmer | rival])
-        assert compared["is_worth"]
-    assert comparisons([several]) == []
-
-
 def test_solvers_solve_the_system_of_a_flow() -> None:
     flow = open_tank(Scheme(), columns=8, rows=10)
     flow.advance(2e-3)
@@ -52,7 +35,7 @@ def test_solvers_solve_the_system_of_a_flow() -> None:
     assert 0 < rows["SciPy cg, overrelaxed"]["iterations"] < rows["SciPy cg"]["iterations"]
 
 
-def test_a_page_is_written_with_a_peer_that_failed(tmp_path: Path) -> None:
+def test_a_page_is_written_with_a_peer_that_failed() -> None:
     origin = {"machine": {"processor": "a core"}, "commit": "abc", "solver": "def",
               "duration_s": 0.3}  # fmt: skip
     large = {"metal": 100_000, "particles": 170_000, "relaxations": 5, "cpu_s_per_step": 3.0,
@@ -82,10 +65,7 @@ def test_a_page_is_written_with_a_peer_that_failed(tmp_path: Path) -> None:
                            "rows": [peer | {"scheme": "PySPH iisph"},
                                     {"scheme": "PySPH sisph", "stopped": "no compiler"}]},
     }  # fmt: skip
-    draw(results, tmp_path)
     text = page(results)
-    assert "**1 of 1 settings" in text
-    assert "MR10-0.5: 4 s, 20 Pa | MR1: 3 s, 50 Pa | yes" in text
     assert "cost 0.9, 1.2, 1.5 s of processor time in 3 runs" in text
     assert "takes 40 % of a step and finding neighbours 30 %" in text
     assert "100 000 particles of metal and 70 000 of the mould" in text
@@ -93,6 +73,3 @@ def test_a_page_is_written_with_a_peer_that_failed(tmp_path: Path) -> None:
     assert "| SciPy spsolve | - |" in text
     assert "| MR10-0.5 | this | 4.50 | 21.0 |" in text
     assert "PySPH sisph gave no result: no compiler" in text
-    assert (tmp_path / "metal_flow.png").stat().st_size > 5000
-    results["schemes"]["rows"].pop()
-    assert "Not answered: no scheme of one kind ran to its end." in page(results)

@@ -22,7 +22,6 @@ LEAST_SHARE_OF_TABLES = 0.9
 REFERENCE = ("commands.md", "files.md", "keys.md", "limits.md", "measures.md")
 TABLES = (
     "developers/mutations.md",
-    "developers/solidification_ways.md",
     "reproduction_hirata_2017.md",
     "reproduction_hirata_2019.md",
     "reproduction_rojek_2004.md",

@@ -1,0 +1,1 @@
+"""Error against core time of every method, from committed results."""
