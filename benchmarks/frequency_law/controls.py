@@ -10,11 +10,13 @@ import pandas as pd
 
 from benchmarks.frequency_law.series import FREQUENCY, MEASURE, FillCurve, fill_curve
 from sandmould import ROOT
-from sandmould.execution.records import OVER_TIME, TIMES, runs_in
+from sandmould.execution.records import OVER_TIME, TIMES
 from sandmould.runs.columns import CONTROL, PART, RUN, SWEEP, VIBRATION_TIME_S
 from sandmould.statistics.control_case import SPRINGS
 from sandmould.study.collect import read_summary
+from sandmould.study.plan.expand import expand
 from sandmould.study.plan.load_study import open_study
+from sandmould.study.rounds.round_log import ROUNDS_FILE, RoundLog, log_of
 
 OF_SPRINGS = f"{CONTROL}{SPRINGS} "
 FEWEST = 5
@@ -34,8 +36,11 @@ class RecordedCurves:
         record = json.loads((folder / "record.json").read_text(encoding="utf-8"))
         study = open_study(ROOT / record["study"])
         self.name = folder.name
-        # Records may name their runs as an earlier version did.
-        self._scenarios = {run.part: run.scenario for run in runs_in(study, folder)}
+        # Records may name their runs as an earlier version did, and rest on its defaults.
+        kept = folder / ROUNDS_FILE
+        log = log_of(kept.read_bytes()) if kept.is_file() else RoundLog("")
+        planned = expand(study, log.runs, log.certified_hz)
+        self._scenarios = {run.part: run.scenario for run in planned}
         runs = read_summary(folder)
         is_curve = (runs[PART] == SWEEP) | runs[PART].str.startswith(OF_SPRINGS)
         self._runs = runs[is_curve]
