@@ -371,7 +371,7 @@ def report(study: StudyFile) -> None:
     page = folder / "report.html"
     try:
         write_report(folder, page)
-    except ValueError as error:
+    except (ValueError, FileNotFoundError) as error:
         valid = f"a folder of results that can be read ({error})"
         raise BadInputError([Problem("results", str(folder), valid)]) from error
     typer.echo(last_line(folder))

@@ -145,4 +145,4 @@ def test_three_runs_of_the_stand_in_are_whole(tmp_path: Path) -> None:
     assert cost["cpu_s"] > 0
     assert (place.results(3) / "report.html").exists()
     assert len(list(place.results(3).glob("batches/*.done"))) == 1
-    assert files(place, 3)["files"] == 12
+    assert files(place, 3)["files"] == 10
