@@ -69,10 +69,10 @@ OF_RUN: Final = frozenset({
     RUN, REPLICATE, SEED, PART, *OF_OUTCOME, ENGINE, VERSION, RANKS, WALL_S, CPU_S, FILL,
     FILL_WALL_S, FILL_CPU_S, GRAIN_STEPS_PER_S, PEAK_MEMORY_BYTES, TIME_STEP_S, TIME_STEP_FRACTION,
     BED_LIMIT_S, LEAST_LIMIT_S, LIMIT_MOMENTS, LARGEST_OVERLAP_FRACTION, *CLOCK, GRAINS,
-    "begun_again", "steps", "grain_steps", "engine_wall_s", "elements", "element_steps", "particles",
-    "particle_solves", "element_steps_per_s", "particle_solves_per_s", "poisson_iterations",
-    "solver_fraction", "measured_time_s", "measured_vibration_time_s", "measured_stage",
-    "measured_grains", "measured_largest_overlap_fraction",
+    "begun_again", "steps", "grain_steps", "engine_wall_s", "elements", "element_steps",
+    "particles", "particle_solves", "element_steps_per_s", "particle_solves_per_s",
+    "poisson_iterations", "solver_fraction", "measured_time_s", "measured_vibration_time_s",
+    "measured_stage", "measured_grains", "measured_largest_overlap_fraction",
 })  # fmt: skip
 """Columns that runs of some kind have whatever is measured: no measure of a user's has their
 names."""
