@@ -25,13 +25,13 @@ CASES: dict[str, tuple[str, str]] = {
         "based_on: tube\nobjective: {measure: tube_fil_fraction}",
         "trial.yaml: objective.measure = 'tube_fil_fraction' cannot be used: valid is a measure "
         "that this scene will have: nearest are tube_fill_fraction, "
-        "tube_fill_of_bed_fraction, bearing_fraction; sandmould measures lists all.",
+        "tube_fill_of_bed_fraction, bed_solid_fraction; sandmould measures lists all.",
     ),
     "of a tube that was replaced, by default": (
         f"based_on: tube\nscenario: {{obstacles: [{POLYGON}]}}",
         "trial.yaml: state an objective, such as objective: {measure: grains}: this study measures "
-        "grains, bed_height_m, solid_fraction, apparent_density_raw_kg_m3, "
-        "apparent_density_corrected_kg_m3, coordination, coordination_bearing and 7 others.",
+        "grains, bed_height_m, solid_fraction, bed_solid_fraction, apparent_density_raw_kg_m3, "
+        "apparent_density_corrected_kg_m3, coordination and 8 others.",
     ),
     "of a tube that was replaced": (
         f"based_on: tube\nscenario: {{obstacles: [{POLYGON}]}}\n"
@@ -61,7 +61,7 @@ CASES: dict[str, tuple[str, str]] = {
     "margin": (
         "based_on: tube\nequivalence: {margins: {solid_fractn: 0.01}}",
         "trial.yaml: equivalence.margins = 'solid_fractn' cannot be used: valid is a measure that "
-        "this scene will have: nearest are solid_fraction, bearing_fraction, overlap_p99_fraction; "
+        "this scene will have: nearest are solid_fraction, bed_solid_fraction, bearing_fraction; "
         "sandmould measures lists all.",
     ),
     "target of a calibration": (
