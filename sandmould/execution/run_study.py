@@ -53,14 +53,19 @@ def run_study(path: Path, options: Sequence[str], opening: str = "") -> int:
     BadInputError
         Before anything starts.
     """
-    try:
-        return until_stopped(partial(_run_study, path, options, opening), path.stem)
-    finally:
-        note_spent(RESULTS / path.stem, time.process_time())
+    return until_stopped(partial(_run_study, path, options, opening), path.stem)
 
 
 def _run_study(path: Path, options: Sequence[str], opening: str) -> int:
     plan = checked_plan(path)
+    try:
+        return _compute(plan, options, opening)
+    finally:
+        note_spent(RESULTS / plan.study.name, time.process_time())
+
+
+def _compute(plan: Plan, options: Sequence[str], opening: str) -> int:
+    path = plan.study.path
     if starts_jobs(options):
         replace_driver(plan.study.name)
     folder, study = RESULTS / plan.study.name, plan.study.study

@@ -174,6 +174,7 @@ def test_stages_are_falls_and_vibrations() -> None:
     between = {"acceleration_g": 1.0, "frequency_hz": 40.0, "duration_s": 0.1}
     scene = Scenario.model_validate(
         {
+            "time_step": {"bed_fraction": 0},
             "fill": {"layers": [{"count": 300}, {"count": 200}],
                      "vibration_between_layers": between},
             "vibration": [{"acceleration_g": 1.5, "frequency_hz": 30.0, "duration_s": 0.31}],
