@@ -105,7 +105,7 @@ def test_each_engine_prices_each_scene_in_an_empty_folder(
 ) -> None:
     """The trial leaves parts of the scene away; what goes with them must go too."""
     monkeypatch.chdir(tmp_path)
-    for name, value in {"WINDOWS": 1, "WINDOW_S": 1e-3, "FALL_WALL_S": 0.01}.items():
+    for name, value in {"WINDOWS": 1, "WINDOW_S": 1e-3, "FALL_WALL_S": 0.0}.items():
         monkeypatch.setattr(f"sandmould.kinds.sand.speed.{name}", value)
     bed = {"obstacles": [], "background_damping": {"form": "none"}}
     sand = {**TUBE_SCENE["sand"], "disc_inertia": "sphere"}
