@@ -89,7 +89,7 @@ def disturb(
     steps a swing of alternating sign has hardly any.
     """
     start = start_of(scene)
-    scenario = scenario_of(scene, engine, damping_ratio, time_step={"step_s": step_s})
+    scenario = _forced(scenario_of(scene, engine, damping_ratio), step_s)
     velocity = _disturbance(scene, scenario)
     first = float(start.mass_kg @ (velocity**2).sum(axis=1))
     looks: list[tuple[int, float]] = []
@@ -123,6 +123,13 @@ def disturb(
     return DisturbanceResult(DRIFTS if drifts else STABLE, highest, way / height)
 
 
+def _forced(scenario: Scenario, step_s: float) -> Scenario:
+    """The scene with this time step, however long: a study would take it after its fill alone."""
+    fraction = step_s / scenario.critical_step.step_s
+    forced = scenario.time_step.model_copy(update={"fraction": fraction})
+    return scenario.model_copy(update={"time_step": forced})
+
+
 def follow_bed(engine: str, damping_ratio: float, step_s: float) -> Followed:
     """Compute 10 000 steps of the disturbed bed under a study's own guards.
 
@@ -133,7 +140,7 @@ def follow_bed(engine: str, damping_ratio: float, step_s: float) -> Followed:
     step_s : float
     """
     start = start_of("bed")
-    scenario = scenario_of("bed", engine, damping_ratio, time_step={"step_s": step_s})
+    scenario = _forced(scenario_of("bed", engine, damping_ratio), step_s)
     guard = Guard(scenario)
     speed, rise = math.nan, math.nan
     with Opened(scenario) as opened:

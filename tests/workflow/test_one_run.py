@@ -42,7 +42,7 @@ def test_run_leaves_all_its_products_and_no_work(straight: Path) -> None:
     assert cost.grains == 120
     assert 60 * cost.steps < cost.grain_steps < 120 * cost.steps
     assert 0 < cost.engine_wall_s < cost.wall_s
-    assert cost.time_step_fraction == pytest.approx(0.5)
+    assert cost.time_step_fraction == pytest.approx(tube_scene().time_step.fraction)
 
 
 def test_next_layer_enters_only_when_speed_and_loads_say_that_the_last_one_rests(
