@@ -117,7 +117,7 @@ def test_a_fill_that_fails_ends_the_run(tmp_path: Path) -> None:
 
 def test_the_small_shake_shares_its_fill_where_the_engine_can_change_its_checks() -> None:
     for engine, shares in (("reference", True), ("lammps", False)):
-        scene = tube_scene(engine={"name": engine})
+        scene = tube_scene(engine={"name": engine}, time_step={"fraction": 0.5})
         shake = _shaken(scene)
         assert not problems(shake)
         assert engine_problem(shake) is None

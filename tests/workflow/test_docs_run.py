@@ -28,6 +28,7 @@ NOT_TYPED = {
     "sandmould again frequency_20_r1_45f4dc": "is again RUN of another page, which is typed",
     "sandmould compare A B": "needs two finished studies; test_comparison.py compares some",
     "sandmould run my_study.yaml --cluster": "needs Slurm; test_slurm.py has it",
+    "sandmould run my_study.yaml --detach": "needs Slurm; test_slurm.py has it",
     "sandmould run my_study.yaml -- --executor": "needs a scheduler and its plugin",
     "pip install snakemake-executor": "the plugin",
     "pip download": "390 MB from the network",
