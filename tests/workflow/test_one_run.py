@@ -129,8 +129,8 @@ def test_two_ranks_fill_the_same_bed(straight: Path, tmp_path: Path) -> None:
     compute_run(folder, str(tmp_path / "log"), 2, "mpiexec")
     outcome = RunOutcome.read(folder / "outcome.json")
     assert outcome.outcome is Outcome.FINISHED, outcome.detail
-    # Sums run in another order, so grains part after a few collisions. Mean heights of so few grains
-    # are 0.0173 to 0.0202 m with four seeds.
+    # Sums run in another order, so grains part after a few collisions. Mean heights of so few
+    # grains are 0.0173 to 0.0202 m with four seeds.
     one, two = last_snapshot(straight), last_snapshot(folder)
     assert len(two.id) == 120
     assert two.position_m[:, 1].mean() == pytest.approx(one.position_m[:, 1].mean(), rel=0.25)
