@@ -25,6 +25,7 @@ from sandmould.runs.formatting import (
 from sandmould.scenario.drive import BoxDrive
 from sandmould.scenario.vibration import VibrationStage
 from sandmould.statistics.answer import Answer, Decided
+from sandmould.statistics.config import FULL_SHARE
 from sandmould.statistics.refining import Refining
 from sandmould.statistics.settings import Setting
 from sandmould.statistics.verdict import FEW
@@ -51,7 +52,7 @@ REASONS = {
 
 def first_sentence(answer: Answer) -> str:
     """What a careful engineer says first: one sentence or a few short ones."""
-    return worded("answer.j2", it=AnswerWords(answer))
+    return worded("answer.j2", it=AnswerWords(answer), most_runs=MOST_NAMED)
 
 
 def detail_sentences(answer: Answer) -> tuple[str, ...]:
@@ -61,7 +62,7 @@ def detail_sentences(answer: Answer) -> tuple[str, ...]:
 
 def limit_sentences(answer: Answer) -> tuple[str, ...]:
     """What the runs leave open."""
-    return sentences("limits.j2", it=AnswerWords(answer))
+    return sentences("limits.j2", it=AnswerWords(answer), few=FEW)
 
 
 def sand_limits(
@@ -204,6 +205,14 @@ class AnswerWords:
         """The value that is good enough."""
         goal = self.answer.asked.goal
         return "" if goal is None else self.value(goal.value)
+
+    @property
+    def to_target(self) -> str:
+        """How far a space is to be filled; empty where full was asked, or nothing."""
+        goal = self.answer.asked.goal
+        if goal is None or not goal.measure.endswith(OF_BED):
+            return "" if goal is None else f" to {self.target}"
+        return "" if goal.value == FULL_SHARE else f" to {100 * goal.value:.3g} % of what fits"
 
     @property
     def certainty(self) -> str:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from pathlib import Path
 
 import pytest
@@ -36,6 +37,18 @@ def text_of(name: str) -> str:
 @pytest.mark.parametrize("name", QUESTIONS)
 def test_a_question_is_answered_in_these_words(name: str) -> None:
     assert text_of(name) == (GOLDEN / f"{name}.txt").read_text(encoding="utf-8")
+
+
+@pytest.mark.parametrize("name", ["none_reaches", "several_reach"])
+def test_full_is_said_where_it_was_asked_alone(name: str) -> None:
+    answer = QUESTIONS[name]()
+    goal = answer.asked.goal
+    assert goal is not None
+    lower = replace(answer, asked=replace(answer.asked, goal=replace(goal, value=0.8)))
+    said = first_sentence(lower)
+    assert "the pocket to 80 % of what fits" in said
+    assert "95 %" not in said
+    assert "full" not in said
 
 
 @pytest.mark.parametrize("name", QUESTIONS)
