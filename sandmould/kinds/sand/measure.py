@@ -103,10 +103,8 @@ def _measure_cavity(
     position, radius, name = snapshot.position_m, snapshot.radius_m, cavity.name
     grain_m = scenario.sand.mass_median_diameter_m
     unit = "m2" if scenario.dimension == 2 else "m3"
-    free, fits = (
-        free_share(scenario, number),
-        packed * reached_share(cavity, scenario.scene, grain_m),
-    )
+    free = free_share(scenario, number)
+    fits = packed * reached_share(cavity, scenario.scene, grain_m)
     fill = cavity_fill(position, radius, cavity, grain_m, packed)
     voids = cavity_voids(position, radius, cavity, scene, grain_m)
     return {
