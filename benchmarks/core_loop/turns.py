@@ -1,8 +1,9 @@
 """Steps of one bed in one source tree, turn by turn as lines of standard input ask for them.
 
-``python turns.py TREE BED.npz rest|shaken``: it imports from ``TREE`` alone, so that two trees can
-be measured in turns. Each line is a number of steps; each answer has the processor time, s, a
-checksum of all places, the greatest speed, m/s, and the farthest way since the start, m.
+``python turns.py TREE BED.npz rest|shaken STEP``: it imports from ``TREE`` alone, so that two trees
+can be measured in turns with a step of STEP s. Each line is a number of steps; each answer has the
+processor time, s, a file with all places, the greatest speed, m/s, and the farthest way since the
+start, m.
 """
 
 from __future__ import annotations
@@ -10,9 +11,9 @@ from __future__ import annotations
 import argparse
 import importlib
 import json
+import os
 import sys
 import time
-import zlib
 from pathlib import Path
 from typing import Any
 
@@ -21,7 +22,7 @@ import numpy as np
 ACCELERATION_M_S2 = 1.5 * 9.81
 
 
-def _solver(tree: Path, bed_file: Path) -> tuple[Any, float]:
+def _solver(tree: Path, bed_file: Path, step_s: float) -> tuple[Any, float]:
     """Solver of a tree with a bed, and the period of the shaking, s."""
     sys.path.insert(0, str(tree))
     beds = importlib.import_module("benchmarks.engines.beds")
@@ -29,12 +30,13 @@ def _solver(tree: Path, bed_file: Path) -> tuple[Any, float]:
         raise SystemExit(f"{beds.__file__} does not lie in {tree}")
     with np.load(bed_file, allow_pickle=False) as arrays:
         bed = beds.Bed(**{name: a[()] if a.ndim == 0 else a for name, a in arrays.items()})
-    return beds.solver_on(bed), float(beds.PERIOD_S)
+    return beds.solver_on(bed, time_step={"step_s": step_s}), float(beds.PERIOD_S)
 
 
-def main(tree: Path, bed_file: Path, motion: str) -> None:
+def main(tree: Path, bed_file: Path, motion: str, step_s: float) -> None:
     """Answer each line."""
-    solver, period_s = _solver(tree, bed_file)
+    solver, period_s = _solver(tree, bed_file, step_s)
+    kept = bed_file.with_name(f"places_{os.getpid()}.npy")
     omega = 2.0 * np.pi / period_s
 
     def places() -> np.ndarray:
@@ -51,9 +53,10 @@ def main(tree: Path, bed_file: Path, motion: str) -> None:
         solver.advance(moved_m if motion == "shaken" else np.zeros(steps + 2))
         took_s = time.process_time() - begun
         now = places()
+        np.save(kept, now)
         answer = {
             "took_s": took_s,
-            "checksum": zlib.crc32(now.tobytes()),
+            "places": str(kept),
             "fastest_m_s": float(np.linalg.norm(solver.grains.velocity, axis=1).max()),
             "farthest_m": float(np.linalg.norm(now - start, axis=1).max()),
             "step_s": solver.scene.dt,
@@ -66,4 +69,5 @@ if __name__ == "__main__":
     parser.add_argument("tree", type=Path)
     parser.add_argument("bed", type=Path)
     parser.add_argument("motion", choices=("rest", "shaken"))
+    parser.add_argument("step_s", type=float)
     main(*vars(parser.parse_args()).values())

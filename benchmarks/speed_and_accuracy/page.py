@@ -34,6 +34,6 @@ def page(results: Mapping[str, Any]) -> str:
         "charts": {method.name: method for method in methods()},
         "peaks": limits["peaks"],
         "roofline": [bed for bed in limits["beds"] if bed["bed"] in BEDS],
-        "loop": results_of("core_loop")["beds"],
+        "of_loop": results_of("core_loop")["beds"],
     }
     return render(Path(__file__).with_name("page.md.j2"), {**results, **values})
