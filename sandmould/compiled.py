@@ -42,7 +42,9 @@ def njit(**options: Any) -> Callable[[_Function], _Function]:
     """Compile a function for compiled code and for Python; options are those of ``numba.njit``."""
 
     def compiled(function: _Function) -> _Function:
-        dispatcher: Any = _saved_alone(numba.njit(cache=KEEPS, **options)(function))
+        # C code calls none of them: a face for it would be a tenth of the time of compiling.
+        made = numba.njit(cache=KEEPS, no_cfunc_wrapper=True, **options)(function)
+        dispatcher: Any = _saved_alone(made)
         if not options.get("parallel"):  # loading one of these may start threads
             DISPATCHERS[f"{function.__module__}.{function.__qualname__}"] = dispatcher
         return dispatcher

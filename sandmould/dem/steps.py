@@ -235,19 +235,20 @@ def step_chunk(
     return fastest2
 
 
-@njit(**OPTIONS)
-def find_forces(dim: Any, scene: DemScene, moving: Moving) -> None:
+def find_forces(dim: tuple[float, ...], scene: DemScene, moving: Moving) -> None:
     """Find the forces of the places as they are, before any friction; the box is at rest.
+
+    Compiled code does not call it: with constants it would compile ``step_chunk`` a second time.
 
     Parameters
     ----------
     dim : tuple
+        ``PLANE`` or ``SPACE``, which is also the shift, speed and body force: none.
     scene : DemScene
     moving : Moving
     """
-    none = no_vector(dim)
     for c in range(len(moving.bound) - 1):
-        step_chunk(dim, c, scene, moving, moving.grains, moving.ahead, none, none, none, 0.0, False)
+        step_chunk(dim, c, scene, moving, moving.grains, moving.ahead, dim, dim, dim, 0.0, False)
 
 
 @njit(**INLINED)

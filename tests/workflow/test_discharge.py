@@ -49,11 +49,12 @@ class KilledDriver(Driver):
         super().__init__(*given)
         self._dies_in = dies_in
 
-    def _window(self, session: Session) -> None:
+    def _window(self, session: Session) -> bool:
         newest, _ = newest_checkpoint(self._work)
-        super()._window(session)
+        goes_on = super()._window(session)
         if newest is not None and newest[1].stage == self._dies_in:
             raise KilledError
+        return goes_on
 
 
 @pytest.fixture(scope="module")
