@@ -89,7 +89,9 @@ def turn(process: Any, steps: int) -> dict[str, Any]:
 
 def apart_m(answers: dict[str, dict[str, Any]]) -> float:
     """Farthest distance between the places of a grain before and now."""
-    before, now = (np.load(answers[name]["places"]) for name in ("before", "now"))
+    before, now = (
+        np.load(answers[name]["places"], allow_pickle=False) for name in ("before", "now")
+    )
     return float(np.linalg.norm(now - before, axis=1).max())
 
 

@@ -12,10 +12,9 @@ import pandas as pd
 import pytest
 
 from sandmould import ROOT
-from sandmould.kinds.registry import kind_named, kind_of
+from sandmould.kinds.registry import kind_named
 from sandmould.runs.outcome import Outcome
 from sandmould.runs.run_tables import read_costs
-from sandmould.study.plan.expand import expand
 from sandmould.study.plan.load_study import open_study
 from sandmould.user_cache import user_cache
 from tests.workflow.dry_runs import dry_run
@@ -39,19 +38,8 @@ def snakemake(*arguments: str, folder: Path) -> subprocess.CompletedProcess[str]
     return subprocess.run(command, cwd=folder, capture_output=True, text=True, timeout=300)
 
 
-@pytest.fixture(scope="session")
-def speeds(tmp_path_factory: pytest.TempPathFactory) -> None:
-    """Measure the engines' speeds once for all tests."""
-    results = tmp_path_factory.mktemp("results")
-    runs = [run for path in STUDIES for run in expand(open_study(path))]
-    each = {kind_of(run.scenario).planning.speed_class(run.scenario): run for run in runs}
-    for run in each.values():
-        if speed := kind_of(run.scenario).planning.speed:
-            speed.measured(run.scenario, results)
-
-
 @pytest.fixture
-def checkout(tmp_path: Path, speeds: None) -> Path:
+def checkout(tmp_path: Path) -> Path:
     """Link the repository's parts into an empty folder, so that results lie there."""
     for name in ("Snakefile", "workflow", "templates", "config", "profiles"):
         (tmp_path / name).symlink_to(ROOT / name)

@@ -71,25 +71,6 @@ _stage(np.array([0.0, 0.0, 1.0, 0.0]), 1.0, np.ones(1), np.zeros(1), np.zeros(1)
        np.ones(1), system, temperature)
 print(temperature[0])
 """
-MPS = """
-import numpy as np
-from sandmould.casting.mps.collisions import collisions
-from sandmould.casting.mps.neighbours import Neighbours
-near = Neighbours(np.array([0, 1, 1]), np.array([1], np.uint32), np.array([[0.5, 0.0, 0.0]]),
-                  np.ones(1), np.ones(2))
-velocity = np.array([[1.0, 0.0, 0.0], [0.0, 0.0, 0.0]])
-print(collisions(near, velocity, np.zeros(2, np.int8), 1.0, 0.0)[0, 0])
-"""
-PATTERN = """
-from sandmould.pattern_fe.coupling.foam_step import FoamArrays, _open
-from sandmould.dem.addresses import table_of
-import numpy as np
-ints, rows = ("pressed",), ("inverse", "load", "speed", "load_sum")
-arrays = [np.ones(3, np.int64) if name in ints else np.ones((3, 3) if name in rows else 3)
-          for name in FoamArrays._fields]
-table = table_of(arrays)
-print(len(_open(table.ctypes.data).mass))
-"""
 
 
 @pytest.mark.parametrize(
@@ -99,12 +80,8 @@ print(len(_open(table.ctypes.data).mass))
          "4.0 * law.damping_ratio", ("1.0", "2.0")),
         (ARPM, "sandmould/casting/arpm/material.py", "return reference + enthalpy",
          "return 10.0 + enthalpy", ("3.0", "12.0")),
-        (MPS, "sandmould/casting/mps/operators.py", "return (\n        near.away_m[k, 0]",
-         "return (\n        2.0 * near.away_m[k, 0]", ("-0.5", "-1.0")),
-        (PATTERN, "sandmould/dem/addresses.py", "to_floats(table[k, 0]), (table[k, 1],)",
-         "to_floats(table[k, 0]), (table[k, 1] - 1,)", ("3", "2")),
     ],
-    ids=["dem", "arpm", "mps", "pattern"],
+    ids=["dem", "arpm"],
 )  # fmt: skip
 def test_an_edited_callee_is_compiled_again(
     house: Path, script: str, callee: str, old: str, new: str, numbers: tuple[str, str]
