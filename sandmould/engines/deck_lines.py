@@ -11,7 +11,7 @@ from pydantic import BaseModel
 from sandmould.engines.deck import exact, remark
 from sandmould.engines.program import Program, Stage
 from sandmould.scenario.contact import coarser_than_default
-from sandmould.scenario.placement import predicted_bed_height_m
+from sandmould.scenario.placement import layer_classes, predicted_bed_height_m
 from sandmould.scenario.scenario import Scenario
 from sandmould.scenario.stages import StageKind
 
@@ -137,6 +137,10 @@ def size_classes(scenario: Scenario) -> list[dict[str, Any]]:
 def planned_masses_kg(program: Program, classes: list[dict[str, Any]]) -> list[float]:
     """Mass of all grains after each layer."""
     masses = np.array([c["mass_kg"] for c in classes])
-    each = [masses[layer.class_number - 1].sum() for layer in program.layers]
+    scenario = program.scenario
+    each = [
+        masses @ np.bincount(layer_classes(scenario, i + 1, count) - 1, minlength=len(masses))
+        for i, count in enumerate(program.counts)
+    ]
     planned: list[float] = np.cumsum(each).tolist()
     return planned

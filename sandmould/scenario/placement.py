@@ -179,6 +179,17 @@ def placed_grains(s: Scenario) -> PlannedLayer:
     )
 
 
+def layer_classes(s: Scenario, number: int, count: int) -> NDArray[np.int64]:
+    """Classes of the grains that ``plan_layer`` places, found without their places."""
+    if s.fill.grains and number == 1:
+        return placed_grains(s).class_number
+    return _draw_classes(s, count, _drawing(s, number))
+
+
+def _drawing(s: Scenario, number: int) -> np.random.Generator:
+    return np.random.default_rng([s.seed, number])
+
+
 def plan_layer(s: Scenario, number: int, count: int) -> PlannedLayer:
     """Place one layer's grains by random sequential addition, largest first.
 
@@ -191,7 +202,7 @@ def plan_layer(s: Scenario, number: int, count: int) -> PlannedLayer:
     """
     if s.fill.grains and number == 1:
         return placed_grains(s)
-    rng = np.random.default_rng([s.seed, number])
+    rng = _drawing(s, number)
     drawn = np.sort(_draw_classes(s, count, rng))[::-1]
     diameters = {c.number: c.diameter_m for c in s.sand.classes(s.dimension)}
     radius = np.array([diameters[c] for c in drawn]) / 2
