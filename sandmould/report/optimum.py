@@ -23,6 +23,7 @@ from sandmould.runs.formatting import (
     name_of,
     number,
     range_text,
+    rounded,
     unit_of,
     value_text,
     with_margin,
@@ -118,8 +119,8 @@ def _where(optimum: Optimum, study: Study, ends: list[str]) -> str:
     for key, value in optimum.setting.items():
         low, high = optimum.interval(key)
         places.append(
-            f"{name_of(key)} {value_text(key, _rounded(value))} "
-            f"(95 % interval {range_text(key, low, _rounded(high))})"
+            f"{name_of(key)} {value_text(key, rounded(value))} "
+            f"(95 % interval {range_text(key, low, rounded(high))})"
         )
     where = f"{listed(places)}: {with_margin(mean, TWO_SIDED * se)}"
     if not ends:
@@ -154,7 +155,7 @@ def _flat(optimum: Optimum, study: Study, key: str) -> str:
     low, high = optimum.no_worse(key, margin)
     how = "the margin set beforehand" if set_margin else "5 % of it"
     said = (
-        f"From {range_text(key, low, _rounded(high))} the mean loses less than "
+        f"From {range_text(key, low, rounded(high))} the mean loses less than "
         f"{number(margin, 2)}, {how}"
     )
     off = WRONG.get(key.rsplit(".", 1)[-1])
@@ -167,10 +168,6 @@ def _flat(optimum: Optimum, study: Study, key: str) -> str:
         if not math.isnan(loss)
     ]
     return f"{said}; a {name} {listed(costs)}." if costs else f"{said}."
-
-
-def _rounded(value: float) -> float:
-    return float(f"{value:.3g}")
 
 
 def _beside(optimum: Optimum, study: Study) -> list[str]:

@@ -6,10 +6,10 @@ import math
 from collections.abc import Iterator
 
 from sandmould.runs.formatting import listed, number
+from sandmould.runs.templates import sentences, worded
 from sandmould.statistics.recommendation import Recommendation
 from sandmould.statistics.robustness import MUST_HOLD, NUMERICS, OptimumShift, Robustness
 from sandmould.statistics.spring_dependence import HoldVerdict, Shape, SpringCurve
-from sandmould.wording.templates import sentences, worded
 
 _SHAPES: dict[Shape, str] = {
     "rising": "no frequency is better than the highest one",

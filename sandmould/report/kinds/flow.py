@@ -34,11 +34,11 @@ from sandmould.report.flow_charts import (
 )
 from sandmould.report.kinds.kind import Findings, KindPages, KindReport
 from sandmould.report.method import Row
-from sandmould.report.sureness import Ground
 from sandmould.report.tables import Cell, Column, Table
 from sandmould.report.time_series import measure_curves
 from sandmould.runs.columns import CLASSIFICATION, DETAIL, HOPS, OUTCOME_CODE, RUN
 from sandmould.runs.formatting import listed, name_of, number, setting_text
+from sandmould.runs.templates import notes
 from sandmould.scenario.casting.flow import MetalFlow, PouredMetal, StillTank
 from sandmould.study.collect import Collected
 from sandmould.wording.next_steps import NextStep
@@ -116,7 +116,12 @@ def _pages(findings: Findings[MetalFlow], film_budget_bytes: int) -> KindPages:
             **numbered("histories", (history.chart for history in histories)),
         },
         answer=next(iter(hopping), "") or _calm(scenario, ranked, keys),
-        grounds=_grounds(scenario),
+        grounds=notes(
+            "flow_grounds.j2",
+            at=scene.deepest(scenario),
+            quiet_pa=QUIET_PA,
+            gradient=scene.scheme_of(scenario).gradient,
+        ),
         steps=_steps(scenario, ranked),
     )
 
@@ -207,24 +212,6 @@ def _steps(scenario: MetalFlow, ranked: pd.DataFrame) -> tuple[NextStep, ...]:
     if (ranked[CLASSIFICATION] == StabilityRating.EXCELLENT.value).any():
         return (NextStep("Pour with the calm setting: the study shoulder_pour shows how."),)
     return (NextStep("Try more relaxations, a smaller c_poi (source_share) or a smaller step."),)
-
-
-def _grounds(scenario: MetalFlow) -> tuple[Ground, ...]:
-    """What calm means, and what the answer rests on."""
-    name = scene.deepest(scenario)
-    return (
-        Ground(
-            "Calm",
-            f"the pressure at {name} deviates by less than {QUIET_PA:g} Pa (standard "
-            "deviation), and no metal hops.",
-        ),
-        Ground("Chance", "nothing in these runs is random: no repeats are needed."),
-        Ground(
-            "Method",
-            "the gradient as the paper prints it makes every run fail; another one, "
-            f"{scene.scheme_of(scenario).gradient}, is used instead.",
-        ),
-    )
 
 
 def _hopping(scenario: MetalFlow, ranked: pd.DataFrame, keys: Sequence[str]) -> tuple[str, ...]:

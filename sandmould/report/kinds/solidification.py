@@ -23,11 +23,11 @@ from sandmould.drawing.figures import png
 from sandmould.kinds.solidification.kind import SolidificationStudy
 from sandmould.report.kinds.kind import Findings, KindPages, KindReport
 from sandmould.report.method import Row
-from sandmould.report.sureness import Ground
 from sandmould.report.tables import Cell, Column, Table
 from sandmould.report.time_series import curve_figures, measure_curves
 from sandmould.runs.columns import CPU_S, RUN, SOLIDIFICATION_TIME_S, TIME_S, finished
 from sandmould.runs.formatting import is_number, listed, name_of, number, seconds, setting_text
+from sandmould.runs.templates import notes
 from sandmould.scenario.casting.solidification import MouldMaterial, Solidification
 from sandmould.statistics.answer import Answer
 from sandmould.statistics.refining import resolution_among
@@ -93,7 +93,11 @@ def _pages(findings: Findings[Solidification], film_budget_bytes: int) -> KindPa
             **curve_figures(curves),
         },
         answer="" if study.seeks_best else _cheapest(errors, reference, collected),
-        grounds=_grounds(bool(stand_ins), scenario),
+        grounds=notes(
+            "casting_grounds.j2",
+            has_stand_ins=bool(stand_ins),
+            dimensions=scenario.dimensions,
+        ),
         steps=() if resolution_among(keys) and not reference else _steps(scenario, bool(reference)),
     )
 
@@ -122,21 +126,6 @@ def _stand_ins(keys: Sequence[str]) -> tuple[str, ...]:
     names = [f"{key.rpartition('.')[0].replace('.', ' ')} {name_of(key)}" for key in keys]
     return (f"Placeholder values, so do not use these times for your alloy: "
             f"{listed(names, most=20)}.",)  # fmt: skip
-
-
-def _grounds(has_stand_ins: bool, scenario: Solidification) -> tuple[Ground, ...]:
-    """What the answer rests on."""
-    values = (
-        "some are placeholders: do not use these times for your alloy."
-        if has_stand_ins
-        else "those of the study's sources."
-    )
-    flat = "two dimensions: heat that leaves across the plane is not counted."
-    return (
-        Ground("Material values", values),
-        Ground("Chance", "nothing in these runs is random: no repeats are needed."),
-        *([Ground("Shape", flat)] if scenario.dimensions == 2 else []),
-    )
 
 
 def _pictured_run(reference: Point, collected: Collected, best: str) -> str:
