@@ -7,7 +7,17 @@ from functools import cache
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 from sandmould import SHIPPED
-from sandmould.runs.formatting import display_number, listed, name_of, number, rounded, value_text
+from sandmould.runs.formatting import (
+    display_number,
+    listed,
+    name_of,
+    number,
+    range_text,
+    rounded,
+    seconds,
+    value_text,
+    with_margin,
+)
 
 if TYPE_CHECKING:
     from jinja2 import Environment
@@ -30,9 +40,10 @@ def _environment() -> Environment:
     environment = ImmutableSandboxedEnvironment(
         loader=FileSystemLoader(TEMPLATES), undefined=StrictUndefined
     )
-    words = {"listed": listed, "name": name_of, "number": number, "rounded": rounded}
-    environment.filters |= words
-    environment.globals |= {"shown": display_number, "value_text": value_text}
+    filters = (listed, number, rounded, seconds)
+    environment.filters |= {it.__name__: it for it in filters} | {"name": name_of}
+    called = (display_number, range_text, value_text, with_margin)
+    environment.globals |= {it.__name__: it for it in called}
     return environment
 
 

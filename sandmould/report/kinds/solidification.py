@@ -27,7 +27,7 @@ from sandmould.report.tables import Cell, Column, Table
 from sandmould.report.time_series import curve_figures, measure_curves
 from sandmould.runs.columns import CPU_S, RUN, SOLIDIFICATION_TIME_S, TIME_S, finished
 from sandmould.runs.formatting import is_number, listed, name_of, number, seconds, setting_text
-from sandmould.runs.templates import notes
+from sandmould.runs.templates import notes, worded
 from sandmould.scenario.casting.solidification import MouldMaterial, Solidification
 from sandmould.statistics.answer import Answer
 from sandmould.statistics.refining import resolution_among
@@ -158,16 +158,8 @@ def _fields(folder: Path, scenario: Solidification) -> tuple[str, tuple[str, ...
     left, right = figure.subplots(1, 2)
     draw_freezing(fields, frozen, left)
     draw_temperature(fields, frozen, right)
-    said = "Some of the casting is still liquid at the end of the run."
-    if math.isfinite(frozen.solidification_time_s):
-        at = ", ".join(
-            f"{axis} = {number(1e3 * place_m)} mm"
-            for axis, place_m in zip("xyz", frozen.last_point_m, strict=False)
-        )
-        said = (
-            f"The casting is solid after {number(frozen.solidification_time_s)} s; the last "
-            f"point to freeze lies at {at}."
-        )
+    is_solid = math.isfinite(frozen.solidification_time_s)
+    said = worded("frozen.j2", it=frozen, is_solid=is_solid)
     axes = [Column(f"{name}, mm") for name in "yz"[: scenario.dimensions - 1]]
     columns = (Column("hot spot at x, mm"), *axes, Column("frozen after, s"))
     rows = tuple(
@@ -203,20 +195,13 @@ def _cheapest(errors: Sequence[_Error], reference: Point, collected: Collected) 
     if not errors:
         return ""
     near = [e for e in errors if abs(e.time_percent) <= NEAR_PERCENT]
-    of = "of the solidification time of the reference"
-    if not near:
-        nearest = min(errors, key=lambda e: abs(e.time_percent))
-        return (
-            f"No setting comes within {NEAR_PERCENT:g} % {of}: the nearest, {nearest.label}, is "
-            f"{number(abs(nearest.time_percent), 2)} % off it."
-        )
     done = collected.summary[finished(collected.summary)]
-    reference_s = float(_of_point(done, reference)[CPU_S].iloc[0])
-    cheap = near[0]
-    return (
-        f"The cheapest setting within {NEAR_PERCENT:g} % {of} is {cheap.label}: "
-        f"{number(abs(cheap.time_percent), 2)} % off it in {seconds(cheap.cpu_s)} of processor "
-        f"time instead of {seconds(reference_s)}."
+    return worded(
+        "cheapest.j2",
+        near=near[0] if near else None,
+        nearest=min(errors, key=lambda e: abs(e.time_percent)),
+        near_percent=NEAR_PERCENT,
+        reference_s=float(_of_point(done, reference)[CPU_S].iloc[0]),
     )
 
 
