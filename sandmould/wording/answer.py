@@ -290,7 +290,7 @@ class AnswerWords:
 
     @property
     def stand_in_sections(self) -> str:
-        """What the stand-in values belong to."""
+        """What the placeholder values belong to."""
         return listed(sorted({key.partition(".")[0] for key in self.answer.stand_ins}))
 
     @cached_property

@@ -72,7 +72,7 @@ def _lacking(found: HoldVerdict) -> Iterator[str]:
         some = [curve for curve in found.lacking if curve.limbs.shape == shape]
         said = f"{_SHAPES[shape]} with springs {listed([f'x{c.factor:g}' for c in some])}"
         seen = [c.limbs.seen for c in some if math.isfinite(c.limbs.seen)]
-        yield f"{said} (a drop below {number(max(seen), 2)} is not told)" if seen else said
+        yield f"{said} (a drop below {number(max(seen), 2)} would not show)" if seen else said
 
 
 def _at(curve: SpringCurve) -> str:

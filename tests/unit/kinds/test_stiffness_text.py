@@ -87,9 +87,9 @@ def test_studies_of_record_are_hard(name: str) -> None:
 
 @pytest.mark.parametrize("path", sorted((ROOT / "config" / "studies").glob("*.yaml")),
                          ids=lambda p: p.stem)  # fmt: skip
-def test_a_study_of_soft_sand_says_so_in_its_title(path: Path) -> None:
+def test_a_study_of_too_soft_grains_says_so_in_its_title(path: Path) -> None:
     study = open_study(path).study
     if not isinstance(study.scenario, Scenario):
         return
     found = bed_hardness(study.scenario)
-    assert found is None or not found.soft or "soft sand)" in study.title
+    assert found is None or not found.soft or "grains too soft)" in study.title
