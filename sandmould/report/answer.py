@@ -204,7 +204,7 @@ def optimum_choice(
 
 def _share_figure(share: float, measure: str, label: str) -> KeyNumber:
     space = filled_space(measure).replace("_", " ")
-    note = f"100 %: the {space} packed as densely as the sand round it"
+    note = f"100 %: the sand in the {space} is as dense as that outside"
     return KeyNumber(f"{100 * share:.0f} %", label, note)
 
 

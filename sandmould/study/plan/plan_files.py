@@ -284,8 +284,8 @@ def _fills_line(runs: Sequence[Run], fills: Sequence[Run]) -> str:
     state_bytes = sum(kind_of(fill.scenario).planning.state_bytes(fill.scenario) for fill in fills)
     number = "1 fill" if len(fills) == 1 else f"{len(fills)} fills"
     return (
-        f"The {sharing} runs start from {number} of the box. A fill is computed once and serves "
-        f"several runs. Together the fills take about {size_text(state_bytes)} of the disk."
+        f"The {sharing} runs start from {number} of the box, each computed once. Together the "
+        f"fills take about {size_text(state_bytes)} of the disk."
     )
 
 
