@@ -61,7 +61,7 @@ def test_the_report_begins_with_the_optimum(tmp_path: Path) -> None:
     assert low == pytest.approx(37.0, abs=3.0)
     assert high == pytest.approx(62.0, abs=4.0)
     assert re.search(
-        r"a frequency 10 Hz too low costs 0\.0[12]\d* and 10 Hz too high costs 0\.0", said
+        r"A frequency 10 Hz too low costs 0\.0[12]\d* and 10 Hz too high costs 0\.0", said
     )
     assert "All 2 rounds are done." in said
     assert "The curve is the Gaussian process" in text
