@@ -8,7 +8,7 @@ from dataclasses import dataclass
 from functools import cached_property
 from importlib import import_module
 from pathlib import Path
-from typing import Any, Generic, NamedTuple, TypeVar
+from typing import Any, Generic, TypeVar
 
 from sandmould import ROOT
 from sandmould.bad_input import Problem
@@ -20,6 +20,7 @@ from sandmould.runs.files import write_text
 from sandmould.runs.hashing import solution_hash
 from sandmould.runs.measures import MeasureGroup
 from sandmould.runs.products import Computed, Cost
+from sandmould.runs.templates import Note
 from sandmould.scenario.quantity import Section
 
 AnyScenario = Section
@@ -30,17 +31,6 @@ SpeedClass = tuple[str, int]
 CORE_SECONDS = "core-seconds"
 BASE_MEMORY_MB = 600
 """Python and its libraries."""
-
-
-class Note(NamedTuple):
-    """What a plan tells of a run beside its figures."""
-
-    about: str
-    """Notes of several points about one thing are told once."""
-    text: str
-    """One sentence or two, with figures."""
-    head: str = "Note"
-    """What the line begins with."""
 
 
 class UserProgram(ABC, Generic[ScenarioT]):
@@ -171,7 +161,7 @@ class Planning(ABC, Generic[ScenarioT]):
         return 0.0
 
     def notes(self, scenario: ScenarioT) -> Sequence[Note]:
-        """What a user should know of a run before it starts, though it can be run."""
+        """What a user should know of a run before it starts; several runs tell one thing once."""
         return ()
 
     def settings_lines(self, scenarios: Iterable[ScenarioT]) -> Sequence[str]:

@@ -11,7 +11,6 @@ import pandas as pd
 from sandmould.report.drive import drive_at
 from sandmould.report.optimum import TWO_SIDED, OptimumPages
 from sandmould.report.robustness import RobustnessPages
-from sandmould.report.sureness import Ground
 from sandmould.report.tables import Cell, Column, KeyNumber, Table, share_of_what_fits
 from sandmould.runs.formatting import (
     display_scale,
@@ -19,9 +18,11 @@ from sandmould.runs.formatting import (
     name_of,
     number,
     range_text,
+    rounded,
     value_text,
     with_margin,
 )
+from sandmould.runs.templates import Note, worded
 from sandmould.scenario.drive import DISPLACEMENT, VELOCITY, BoxDrive
 from sandmould.statistics.answer import Answer
 from sandmould.statistics.config import FULL_SHARE
@@ -32,7 +33,6 @@ from sandmould.statistics.verdict import Verdict
 from sandmould.wording.answer import AnswerWords, place_text
 from sandmould.wording.next_steps import NextSteps
 from sandmould.wording.robustness import recommendation_sentence
-from sandmould.wording.templates import worded
 
 MOST_CHOICES = 12
 """Settings that the first screen lists."""
@@ -52,7 +52,7 @@ class FirstScreen:
     """What to set and what comes of it; empty where several settings may be the best."""
     table: Table | None
     """What each of several settings does."""
-    grounds: tuple[Ground, ...]
+    grounds: tuple[Note, ...]
     """How sure it is."""
     steps: NextSteps
 
@@ -181,7 +181,7 @@ def optimum_choice(
     drive = _as_drive(drive_at(summary, optimum.keys, optimum.setting))
     of_keys = [
         KeyNumber(
-            value_text(key, float(f"{value:.3g}")),
+            value_text(key, rounded(value)),
             name_of(key),
             f"95 %: {range_text(key, low, float(f'{high:.3g}'))}",
         )
@@ -204,7 +204,7 @@ def optimum_choice(
 
 def _share_figure(share: float, measure: str, label: str) -> KeyNumber:
     space = filled_space(measure).replace("_", " ")
-    note = f"100 %: the {space} packed as densely as the sand round it"
+    note = f"100 %: the sand in the {space} is as dense as that outside"
     return KeyNumber(f"{100 * share:.0f} %", label, note)
 
 

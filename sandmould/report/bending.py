@@ -29,7 +29,8 @@ from sandmould.runs.columns import (
     TIME_S,
     VIBRATION_TIME_S,
 )
-from sandmould.runs.formatting import number, setting_text, with_margin
+from sandmould.runs.formatting import number, setting_text
+from sandmould.runs.templates import sentences
 from sandmould.scenario.pattern import PatternDrawing
 from sandmould.scenario.scenario import Scenario
 from sandmould.statistics.evidence import left_out, usable_values
@@ -39,12 +40,6 @@ from sandmould.study.collect import Collected
 
 TIP = "pattern_tip_deflection_m"
 RECOVERED = "pattern_tip_recovered_m"
-ROJEK = (
-    "Rojek et al. (2004, section 4.3) state this of their L, in experiment and computation: "
-    "filling distorts it and leaves loose sand below its horizontal part. Vibration lets sand "
-    "flow in there, and the distortion is then slightly reduced. They print no sizes and no "
-    "numbers."
-)
 _RECOVERS = 0.02
 """Share of the deflection that must come back before the page says so."""
 
@@ -121,23 +116,23 @@ def _tip_sentences(
     """What became of the tip and of the sand under the pattern in the run that is shown."""
     if rows.empty:
         return ()
-    said = []
-    if verdict is not None:
-        said.append(f"The run shown: {verdict.sentence[0].lower()}{verdict.sentence[1:]}")
     shaken = rows[rows[VIBRATION_TIME_S] >= 0.0]
-    first = shaken.iloc[0] if len(shaken) else rows.iloc[-1]
-    last = rows.iloc[-1]
-    said.append(f"Its tip had sunk by {_mm(first[TIP])} mm when the box was filled{_under(first)}.")
-    if scenario.vibrations and len(shaken) > 1:
-        back = 1.0 - last[TIP] / first[TIP] if first[TIP] else 0.0
-        way = "hardly moved it"
-        if abs(back) > _RECOVERS:
-            way = "gave back a part of it" if back > 0.0 else "bent it farther"
-        said.append(
-            f"{last[VIBRATION_TIME_S]:.3g} s of vibration {way}: {_mm(last[TIP])} mm at the "
-            f"end{_under(last)}."
-        )
-    return tuple(said)
+    first, last = (shaken.iloc[0] if len(shaken) else rows.iloc[-1]), rows.iloc[-1]
+    return sentences(
+        "bending.j2",
+        loop_said=verdict.sentence if verdict else "",
+        first=_tip(first),
+        last=_tip(last),
+        shaken_s=last[VIBRATION_TIME_S] if scenario.vibrations and len(shaken) > 1 else 0.0,
+        back=1.0 - last[TIP] / first[TIP] if first[TIP] else 0.0,
+        recovers=_RECOVERS,
+    )
+
+
+def _tip(row: pd.Series[Any]) -> dict[str, float]:
+    """Where the tip is, and how full the space under the pattern."""
+    under = row.get("pattern_under_fraction", math.nan)
+    return {"tip_mm": 1e3 * row[TIP], "under": under, "bed": row[SOLID_FRACTION]}
 
 
 def paper_sentences(scenario: Scenario, collected: Collected, pictured_run: str) -> tuple[str, ...]:
@@ -166,35 +161,7 @@ def paper_sentences(scenario: Scenario, collected: Collected, pictured_run: str)
     groups = group_settings(summary, keys)
     at, rows = next((at, own) for at, own in groups if pictured_run in set(own[RUN].astype(str)))
     fillings = setting_of(at, len(rows), 1e3 * usable_values(rows, RECOVERED).dropna())
-    where = f" at {fillings.label}" if keys else ""
-    if fillings.n < 2:
-        few = "one filling" if fillings.n else "no filling"
-        return ROJEK, f"Here {few}{where} can be used: too few to judge that statement by."
-    mean, reach = fillings.mean, fillings.ci_half_width
-    if mean - reach > 0.0:
-        so = "the tip comes back, as the paper states"
-    elif mean + reach < 0.0:
-        so = "the tip goes on sinking, other than the paper states"
-    else:
-        so = "whether the tip comes back is not told by so few fillings"
-    return ROJEK, (
-        f"Here vibration gave back {with_margin(mean, reach)} mm of the tip's sinking{where} (mean "
-        f"of {fillings.n} fillings, 95 % interval): {so}."
-    )
-
-
-def _under(row: pd.Series[Any]) -> str:
-    """How full the space under the pattern was."""
-    under, bed = row.get("pattern_under_fraction", math.nan), row[SOLID_FRACTION]
-    if not math.isfinite(under):
-        return ""
-    return (
-        f"; {100 * under:.0f} % of the space under it was sand, of the whole bed {100 * bed:.0f} %"
-    )
-
-
-def _mm(length_m: float) -> str:
-    return number(1e3 * length_m)
+    return sentences("papers_l.j2", it=fillings, by_setting=bool(keys))
 
 
 def deflection_chart(collected: Collected, verdict: Verdict) -> Chart | None:

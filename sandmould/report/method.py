@@ -10,7 +10,6 @@ from typing import Any
 import pandas as pd
 
 from sandmould.definition.study import Objective
-from sandmould.kinds.sand.hardness_text import hardness_text
 from sandmould.runs.columns import (
     BED_LIMIT_S,
     ENGINE,
@@ -24,6 +23,7 @@ from sandmould.runs.columns import (
     VERSION,
 )
 from sandmould.runs.formatting import listed, name_of, number, seconds, value_text
+from sandmould.runs.templates import worded
 from sandmould.scenario.contact import ContactLaw
 from sandmould.scenario.hardness import bed_hardness
 from sandmould.scenario.own_deck import OwnDeck
@@ -77,7 +77,7 @@ def sand_method(scenario: Scenario, keys: Sequence[str], summary: pd.DataFrame) 
         ),
         Row("Grain on grain", _law(contact.grain_grain)),
         Row("Grain on wall", _law(contact.grain_wall)),
-        *([Row("Hardness", hardness_text(hardness))] if hardness else []),
+        *([Row("Stiffness", worded("stiffness.j2", it=hardness))] if hardness else []),
         Row("No tension, Rojek 2004, eq. (18)", _NO_TENSION[contact.no_tension]),
         Row("Background damping", _damping(scenario)),
         Row("Filling", _filling(scenario)),

@@ -6,6 +6,7 @@ import math
 from dataclasses import dataclass, replace
 from pathlib import Path
 from statistics import NormalDist
+from typing import Any
 
 import numpy as np
 import pandas as pd
@@ -19,14 +20,11 @@ from sandmould.report.robustness import RobustnessPages
 from sandmould.runs.columns import CPU_S, total_s
 from sandmould.runs.formatting import (
     display_scale,
-    listed,
-    name_of,
     number,
-    range_text,
     unit_of,
-    value_text,
     with_margin,
 )
+from sandmould.runs.templates import sentences, worded
 from sandmould.statistics.emulator import TooFewRunsError
 from sandmould.statistics.mean_tests import CONFIDENCE
 from sandmould.statistics.optimum import Optimum, find_optimum
@@ -89,10 +87,20 @@ def optimum_pages(
         for key, width in study.refine.interval.items()
         if optimum.interval(key)[1] - optimum.interval(key)[0] > width
     ]
-    said = [_where(optimum, study, ends), *(_flat(optimum, study, key) for key in keys)]
+    mean, se = optimum.value
+    said = [
+        *sentences(
+            "optimum_found.j2",
+            it=optimum,
+            measure=objective.measure,
+            ends=ends,
+            value=with_margin(mean, TWO_SIDED * se),
+            flats=[_flat(optimum, study, key) for key in keys],
+            reported=objective.reported_best if len(keys) == 1 else (),
+        )
+    ]
     if mode and (key := frequency_key(study.sweep)):
         said.insert(1, mode.beside(optimum.setting[key]))
-    said += _beside(optimum, study)
     if study.refine.rounds:
         said.append(effort_sentence(log, study, summary))
     sound = not ends and not wide
@@ -110,31 +118,6 @@ def optimum_pages(
     return OptimumPages(tuple(said), sound, optimum, advised)
 
 
-def _where(optimum: Optimum, study: Study, ends: list[str]) -> str:
-    what = name_of(study.objective.measure)
-    most = "highest" if optimum.sign > 0 else "lowest"
-    mean, se = optimum.value
-    places = []
-    for key, value in optimum.setting.items():
-        low, high = optimum.interval(key)
-        places.append(
-            f"{name_of(key)} {value_text(key, _rounded(value))} "
-            f"(95 % interval {range_text(key, low, _rounded(high))})"
-        )
-    where = f"{listed(places)}: {with_margin(mean, TWO_SIDED * se)}"
-    if not ends:
-        return f"The {what} is {most} at {where}."
-    reached = [
-        f"the {end.replace(' and ', ' and the ')} {name_of(key)} swept"
-        for key in ends
-        for end in [optimum.at_end(key)]
-    ]
-    return (
-        f"Among what was swept the {what} is {most} at {where}, but the interval reaches "
-        f"{listed(reached)}, so the optimum may lie beyond."
-    )
-
-
 def _advised(optimum: Optimum, study: Study, robustness: RobustnessPages) -> Recommendation | None:
     """A frequency for the table, where the springs allow one."""
     key = frequency_key(study.sweep)
@@ -146,56 +129,34 @@ def _advised(optimum: Optimum, study: Study, robustness: RobustnessPages) -> Rec
     return recommend(robustness.assessment, optimum.interval(key), robustness.mode.wave_speed, sand)
 
 
-def _flat(optimum: Optimum, study: Study, key: str) -> str:
+def _flat(optimum: Optimum, study: Study, key: str) -> dict[str, Any]:
     """How far a key may be off without harm, and what a usual error costs."""
-    measure, name = study.objective.measure, name_of(key)
-    set_margin = study.equivalence.margins.get(measure)
+    set_margin = study.equivalence.margins.get(study.objective.measure)
     margin = set_margin or SHARE_LOST * abs(optimum.value[0])
-    low, high = optimum.no_worse(key, margin)
-    how = "the margin set beforehand" if set_margin else "5 % of it"
-    said = (
-        f"From {range_text(key, low, _rounded(high))} the mean loses less than "
-        f"{number(margin, 2)}, {how}"
-    )
     off = WRONG.get(key.rsplit(".", 1)[-1])
     if off is None:
         values = optimum.points[:, optimum.keys.index(key)]
         off = float(f"{0.1 * (values.max() - values.min()):.1g}")
-    costs = [
-        f"{value_text(key, off)} too {side} costs {number(loss, 2)}"
-        for side, loss in (("low", optimum.loss(key, -off)), ("high", optimum.loss(key, off)))
-        if not math.isnan(loss)
-    ]
-    return f"{said}; a {name} {listed(costs)}." if costs else f"{said}."
-
-
-def _rounded(value: float) -> float:
-    return float(f"{value:.3g}")
-
-
-def _beside(optimum: Optimum, study: Study) -> list[str]:
-    """What others have found best, beside the interval."""
-    if len(optimum.keys) > 1:
-        return []
-    (key,) = optimum.keys
-    low, high = optimum.interval(key)
-    return [
-        f"{value_text(key, reported.value)} by {reported.by} "
-        f"{'lies' if low <= reported.value <= high else 'does not lie'} in the interval."
-        for reported in study.objective.reported_best
-    ]
+    losses = {"low": optimum.loss(key, -off), "high": optimum.loss(key, off)}
+    return {
+        "key": key,
+        "reach": optimum.no_worse(key, margin),
+        "margin": margin,
+        "is_set": bool(set_margin),
+        "off": off,
+        "losses": {side: loss for side, loss in losses.items() if not math.isnan(loss)},
+    }
 
 
 def effort_sentence(log: RoundLog, study: Study, summary: pd.DataFrame) -> str:
     """What the rounds added to the sweep, and why they ended."""
-    added, swept = len(log.runs), study.sweep.number_of_points * study.replicates
-    rounds = len(log.rounds)
-    spent_h = total_s(summary, CPU_S) / 3600
-    rounds_text = "No round" if not rounds else "1 round" if rounds == 1 else f"{rounds} rounds"
-    return (
-        f"{rounds_text} added {added or 'any'} runs to the {swept} of the sweep, "
-        f"{number(spent_h, 2)} h of processor time in all. "
-        f"{log.ended or 'Rounds go on: sandmould run continues them.'}"
+    return worded(
+        "effort.j2",
+        rounds=len(log.rounds),
+        added=len(log.runs),
+        swept=study.sweep.number_of_points * study.replicates,
+        spent_h=total_s(summary, CPU_S) / 3600,
+        ended=log.ended,
     )
 
 

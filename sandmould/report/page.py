@@ -51,7 +51,6 @@ from sandmould.report.optimum import (
 )
 from sandmould.report.robustness import RobustnessPages
 from sandmould.report.sand import pictured_runs
-from sandmould.report.sureness import certificate_ground, finished_ground
 from sandmould.report.tables import (
     KeyNumber,
     data_files,
@@ -62,6 +61,7 @@ from sandmould.report.tables import (
 from sandmould.runs.columns import RUN, finished
 from sandmould.runs.files import replaced, write_text
 from sandmould.runs.formatting import name_of, setting_text
+from sandmould.runs.templates import Note, notes
 from sandmould.scenario.drive import BoxDrive
 from sandmould.scenario.quantity import Section
 from sandmould.statistics.answer import Asked
@@ -72,7 +72,12 @@ from sandmould.study.collect import Collected, read_collected, read_provenance, 
 from sandmould.study.plan.ownership import owner_of, shipped_name
 from sandmould.study.plan.plan_files import FIGURES, SPHERES, STUDY_FILE, VERDICT_FILE, read_run
 from sandmould.study.rounds.round_log import read_rounds
-from sandmould.wording.answer import detail_sentences, first_sentence, limit_sentences
+from sandmould.wording.answer import (
+    detail_sentences,
+    first_sentence,
+    limit_sentences,
+    reasons_text,
+)
 from sandmould.wording.next_steps import (
     agreement_steps,
     answer_steps,
@@ -298,9 +303,9 @@ def _first_screen(
     else:
         figures, table = figures_of(answer, summary), table_of(answer)
     grounds = (
-        *finished_ground(answer),
+        *notes("unused.j2", reasons=reasons_text(answer.left_out), planned=answer.planned),
         *of_kind.grounds,
-        *certificate_ground(study, robustness),
+        *([Note("Tests", robustness.sentences[0])] if robustness else []),
     )
     lost = [str(run) for run in collected.summary.loc[~finished(collected.summary), RUN]]
     steps = [*failed_steps(lost), *steps, *of_kind.steps, *certificate_steps(study, answer)]

@@ -173,7 +173,7 @@ def settings_table(verdict: Verdict, drives: Mapping[str, BoxDrive]) -> Table:
     columns = (
         Column("setting", False),
         *map(Column, ("mean ± 95 %", "best minus this", "95 % interval", "p")),
-        Column("judged", False),
+        Column("beside the best", False),
         *map(Column, ("sd", "runs", *drive)),
     )
     rows, marked = [], []
@@ -181,13 +181,13 @@ def settings_table(verdict: Verdict, drives: Mapping[str, BoxDrive]) -> Table:
         against = verdict.against(setting)
         is_best = verdict.best is not None and setting.label == verdict.best.label
         interval, p, difference = "–", math.nan, math.nan
-        standing = "best mean" if is_best else "no run"
+        standing = "best" if is_best else "no run"
         if against is not None:
             difference, p = against.difference, against.p
             standing = "not tested"
             if against.tested:
                 interval = f"{number(against.ci[0], 2)} to {number(against.ci[1], 2)}"
-                standing = "worse" if against.separated else "undecided"
+                standing = "worse" if against.separated else "no clear difference"
         rows.append(
             (
                 Cell(setting.label, str(place)),

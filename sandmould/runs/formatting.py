@@ -131,6 +131,11 @@ def number(value: Any, digits: int = 3) -> str:
     return text.rstrip("0").rstrip(".") if "." in text and float(x).is_integer() else text
 
 
+def rounded(value: float) -> float:
+    """Three significant digits of a value, for a text that shows more than it knows."""
+    return float(f"{value:.3g}")
+
+
 def with_margin(mean: float, half_width: float) -> str:
     """A mean with its half width, both to the second digit of the half width."""
     if not math.isfinite(half_width) or half_width <= 0:

@@ -11,6 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 from threadpoolctl import threadpool_limits
 
+from sandmould.runs.templates import worded
 from sandmould.statistics.config import fewest_points
 
 Array = NDArray[np.float64]
@@ -106,9 +107,8 @@ def fit_emulator(measure: str, points: Array, values: Array) -> Emulator:
     distinct, place, count = np.unique(points, axis=0, return_inverse=True, return_counts=True)
     fewest = fewest_points(points.shape[1])
     if len(distinct) < fewest:
-        raise TooFewRunsError(
-            f"{measure} is known at {len(distinct)} points, at least {fewest} are needed"
-        )
+        known = {"measure": measure, "known": len(distinct), "fewest": fewest}
+        raise TooFewRunsError(worded("too_few.j2", **known))
     means = np.bincount(place, values) / count
     freedom = int((count - 1).sum())
     pooled = float(((values - means[place]) ** 2).sum()) / freedom if freedom else math.nan

@@ -10,6 +10,7 @@ import numpy as np
 import pandas as pd
 import scipy
 
+from sandmould.runs.templates import worded
 from sandmould.statistics.mean_tests import compare_means
 
 EquivalenceVerdict = Literal["equivalent", "different", "not resolved", "not tested"]
@@ -35,8 +36,6 @@ class Agreement:
     """Pairs, or runs of the smaller group."""
     paired: bool
     verdict: EquivalenceVerdict
-    note: str
-    """What the verdict rests on, where that needs words."""
     more: int | None = None
     """Further replicates that would probably resolve it, where that is not too many."""
 
@@ -44,6 +43,16 @@ class Agreement:
     def difference(self) -> float:
         """Mean of the first minus that of the second."""
         return self.means[0] - self.means[1]
+
+    @property
+    def is_one_number(self) -> bool:
+        """Whether all pairs are the same to round-off."""
+        return self.ci[0] == self.ci[1] and abs(self.difference) < 1e-9 * self.margin
+
+    @property
+    def note(self) -> str:
+        """What the verdict rests on, where that needs words."""
+        return worded("agreement_note.j2", it=self, most=MOST_REPLICATES)
 
 
 def agree(first: pd.Series[float], second: pd.Series[float], margin: float) -> Agreement:
@@ -69,9 +78,7 @@ def agree(first: pd.Series[float], second: pd.Series[float], margin: float) -> A
     difference = means[0] - means[1]
     nothing = (math.nan, math.nan)
     if n < 2:
-        runs = "pair of finished runs" if len(shared) else "finished run on one side"
-        note = f"only one {runs}" if n else "no finished run on one side"
-        return Agreement(means, nothing, margin, n, bool(len(shared)), "not tested", note)
+        return Agreement(means, nothing, margin, n, bool(len(shared)), "not tested")
     test = compare_means(first, second)
     if test is None:
         return _without_spread(first, means, margin, n)
@@ -80,16 +87,10 @@ def agree(first: pd.Series[float], second: pd.Series[float], margin: float) -> A
     ci = float(low), float(high)
     verdict = classify_interval(ci, margin)
     if verdict != "not resolved":
-        return Agreement(means, ci, margin, n, paired, verdict, "")
+        return Agreement(means, ci, margin, n, paired, verdict)
     error = (ci[1] - ci[0]) / 2 / float(scipy.special.stdtrit(result.df, 0.5 + CONFIDENCE / 2))
     more = _more(abs(difference), error * math.sqrt(n), margin, n, paired)
-    note = (
-        f"more than {MOST_REPLICATES} replicates would be needed: the difference lies about on "
-        "the margin"
-        if more is None
-        else f"about {more} more replicates would be needed at this spread"
-    )
-    return Agreement(means, ci, margin, n, paired, verdict, note, more)
+    return Agreement(means, ci, margin, n, paired, verdict, more)
 
 
 def classify_interval(ci: tuple[float, float], margin: float) -> EquivalenceVerdict:
@@ -105,12 +106,10 @@ def _without_spread(
 ) -> Agreement:
     """Pairs that all differ by the same amount, most often by nothing."""
     if float(first.std(ddof=1)) <= 1e-12 * float(first.abs().max()):
-        note = "the replicates do not differ: check that the seed reaches the sand"
-        return Agreement(means, (math.nan, math.nan), margin, n, True, "not tested", note)
+        return Agreement(means, (math.nan, math.nan), margin, n, True, "not tested")
     difference = means[0] - means[1]
     ci = (difference, difference)
-    note = "the same to round-off in every pair" if abs(difference) < 1e-9 * margin else ""
-    return Agreement(means, ci, margin, n, True, classify_interval(ci, margin), note)
+    return Agreement(means, ci, margin, n, True, classify_interval(ci, margin))
 
 
 def _more(size: float, spread: float, margin: float, n: int, paired: bool) -> int | None:

@@ -6,9 +6,9 @@ from collections import Counter
 from collections.abc import Sequence
 
 from sandmould.runs.formatting import listed, name_of
+from sandmould.runs.templates import sentences
 from sandmould.statistics.agreement import Compared
 from sandmould.statistics.equivalence import PERCENT
-from sandmould.wording.templates import sentences
 
 MOST_NAMED = 2
 """Compared pairs that a sentence names; of more it counts them."""

@@ -22,6 +22,7 @@ from sandmould.runs.formatting import (
     value_text,
     with_margin,
 )
+from sandmould.runs.templates import sentences, worded
 from sandmould.scenario.drive import BoxDrive
 from sandmould.scenario.vibration import VibrationStage
 from sandmould.statistics.answer import Answer, Decided
@@ -29,7 +30,6 @@ from sandmould.statistics.config import FULL_SHARE
 from sandmould.statistics.refining import Refining
 from sandmould.statistics.settings import Setting
 from sandmould.statistics.verdict import FEW
-from sandmould.wording.templates import sentences, worded
 
 MOST_NAMED = 100
 """More further runs are named nowhere: their estimate is as uncertain as the difference."""
@@ -290,7 +290,7 @@ class AnswerWords:
 
     @property
     def stand_in_sections(self) -> str:
-        """What the stand-in values belong to."""
+        """What the placeholder values belong to."""
         return listed(sorted({key.partition(".")[0] for key in self.answer.stand_ins}))
 
     @cached_property

@@ -25,7 +25,7 @@ TEXTS: Mapping[str, str] = {
     "longer": "Shake for longer (duration_s): the {measure} was still getting better.",
     "beyond": "Try {a_key} {side} {value}: the sweep ends there.",
     "turn": "Turn the {space}, widen its mouth or vent it: shaking does not fill it.",
-    "chance": "Run every setting at least {runs} times: then chance can be told.",
+    "chance": "Run every setting at least {runs} times, to see how much chance matters.",
     "more": "Run about {runs} more fillings of each setting: they would tell {settings} apart.",
     "choose": "Choose between {settings} by what suits your machine.",
     "finer": "Halve the finest {key} once more: the error is {percent:.0f} % of the value.",

@@ -6,10 +6,10 @@ import math
 from collections.abc import Iterator
 
 from sandmould.runs.formatting import listed, number
+from sandmould.runs.templates import sentences, worded
 from sandmould.statistics.recommendation import Recommendation
 from sandmould.statistics.robustness import MUST_HOLD, NUMERICS, OptimumShift, Robustness
 from sandmould.statistics.spring_dependence import HoldVerdict, Shape, SpringCurve
-from sandmould.wording.templates import sentences, worded
 
 _SHAPES: dict[Shape, str] = {
     "rising": "no frequency is better than the highest one",
@@ -72,7 +72,7 @@ def _lacking(found: HoldVerdict) -> Iterator[str]:
         some = [curve for curve in found.lacking if curve.limbs.shape == shape]
         said = f"{_SHAPES[shape]} with springs {listed([f'x{c.factor:g}' for c in some])}"
         seen = [c.limbs.seen for c in some if math.isfinite(c.limbs.seen)]
-        yield f"{said} (a drop below {number(max(seen), 2)} is not told)" if seen else said
+        yield f"{said} (a drop below {number(max(seen), 2)} would not show)" if seen else said
 
 
 def _at(curve: SpringCurve) -> str:

@@ -4,17 +4,18 @@ from __future__ import annotations
 
 import contextlib
 import time
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterator, Mapping
 from pathlib import Path
 
 from sandmould.bad_input import Problem
 from sandmould.casting.mps import computation, scene, source_hash
 from sandmould.casting.mps.shoulder import PAPERS, POUR_M_S
 from sandmould.kinds.casting import CastingPlanning
-from sandmould.kinds.kind import BASE_MEMORY_MB, Note, SpeedClass
+from sandmould.kinds.kind import BASE_MEMORY_MB, SpeedClass
 from sandmould.kinds.stored_speed import StoredSpeed
 from sandmould.limits import FRAMES, PARTICLES, RECORDS
 from sandmould.runs.measures import once, read_groups
+from sandmould.runs.templates import Note, notes
 from sandmould.scenario.casting.flow import MetalFlow, StillTank
 
 PARTICLES_PER_MB = 300
@@ -102,15 +103,10 @@ class FlowPlanning(CastingPlanning[MetalFlow]):
             "simulated": f"{scenario.duration_s:g} s",
         }
 
-    def notes(self, scenario: MetalFlow) -> Sequence[Note]:
+    def notes(self, scenario: MetalFlow) -> tuple[Note, ...]:
         """Poured metal whose particles may pass through each other."""
-        if isinstance(scenario.case, StillTank) or scenario.collision_distance > 0.0:
-            return ()
-        text = (
-            "Metal is poured with collision_distance 0. Both settings of shoulder_pour broke off "
-            "so before a quarter was poured; with 0.8 they ran to their end."
-        )
-        return (Note("collisions", text),)
+        pours = not isinstance(scenario.case, StillTank)
+        return notes("plan_flow.j2", passes=pours and scenario.collision_distance == 0.0)
 
 
 def _limit_problems(scenario: MetalFlow) -> Iterator[Problem]:

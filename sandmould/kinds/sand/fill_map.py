@@ -16,7 +16,6 @@ import yaml
 from numpy.typing import NDArray
 
 from sandmould import SHIPPED
-from sandmould.runs.formatting import number
 from sandmould.scenario.box import Tube
 from sandmould.scenario.drive import laid_down_drive
 from sandmould.scenario.hardness import Hardness, bed_hardness
@@ -26,10 +25,10 @@ MAP = SHIPPED / "config" / "fill_map.yaml"
 """Written by ``python -m benchmarks.frequency_law``."""
 
 
-def best_by_records(scenarios: Sequence[Scenario]) -> str:
-    """Say at which of the settings the tube should fill best.
+def best_by_records(scenarios: Sequence[Scenario]) -> float:
+    """Find at which of the settings the tube should fill best.
 
-    Empty unless all of them shake one tube of the records' kind upright, within their range, at
+    NaN unless all of them shake one tube of the records' kind upright, within their range, at
     frequencies that differ.
 
     Parameters
@@ -39,12 +38,13 @@ def best_by_records(scenarios: Sequence[Scenario]) -> str:
     """
     fills = {_frequency_hz(scenario): _foretold(scenario) for scenario in scenarios}
     if len(fills) < max(2, len(scenarios)) or not np.isfinite([*fills.values()]).all():
-        return ""
-    best = number(max(fills, key=lambda hz: fills[hz]))
-    return (
-        f"By our records of such a tube {best} Hz should fill it best of these. They foretell its "
-        f"fill to {_map()['error']:.2f} (docs/frequency_law.md)."
-    )
+        return np.nan
+    return max(fills, key=lambda hz: fills[hz])
+
+
+def map_error() -> float:
+    """By how much the map may be off in the fill."""
+    return float(_map()["error"])
 
 
 def _frequency_hz(scenario: Scenario) -> float:

@@ -6,12 +6,11 @@ from sandmould.engines import registry
 from sandmould.geometry.mesh import TriangleMesh
 from sandmould.geometry.outline import Outline
 from sandmould.kernel_cache import are_compiled
-from sandmould.kinds.kind import Note
-from sandmould.kinds.sand.hardness_text import hardness_lines
 from sandmould.kinds.sand.narrow import narrow_spaces
-from sandmould.runs.formatting import number
+from sandmould.runs import templates
+from sandmould.runs.templates import Note
 from sandmould.scenario.checks.wall_thickness import thinnest_wall
-from sandmould.scenario.hardness import bed_hardness
+from sandmould.scenario.hardness import LEAST_KAPPA, bed_hardness
 from sandmould.scenario.pattern import PatternDrawing
 from sandmould.scenario.scenario import Scenario
 from sandmould.scenario.solids import SolidMesh, drawing_notes
@@ -23,63 +22,40 @@ COMPILE_S = 25.0
 pattern (fe_column)."""
 
 
-def notes(scenario: Scenario) -> list[Note]:
-    """How hard the bed is, obstacles thinner than a grain, and shells that were no cavities."""
+def notes(scenario: Scenario) -> tuple[Note, ...]:
+    """How stiff the grains are, spaces and walls thinner than they allow, and drawings."""
     smallest_m = scenario.sand.classes(scenario.dimension)[0].diameter_m
-    hardness = bed_hardness(scenario)
-    told = [Note(head, text, head) for head, text in hardness_lines(hardness)] if hardness else []
-    told += [Note(f"width of {name}", text) for name, text in narrow_spaces(scenario).items()]
-    if registry.calls_our_kernels(scenario) and not are_compiled("dem"):
-        text = (
-            "Sandmould's own code is not compiled on this machine yet. The first start compiles "
-            f"it: about {COMPILE_S:g} s of a core more, once."
-        )
-        told.append(Note("compiling", text))
-    told += _drive_notes(scenario)
     solids: list[Outline | TriangleMesh] = [*scenario.scene.outlines, *scenario.scene.meshes]
-    for solid in solids:
-        wall = thinnest_wall([solid], smallest_m)
-        if wall is not None:
-            place = ", ".join(number(float(x)) for x in wall.place_m)
-            text = (
-                f"{solid.name} has walls thinner than the smallest grain of "
-                f"{number(1e3 * smallest_m)} mm. The thinnest measures "
-                f"{number(1e3 * wall.thickness_m)} mm, at ({place}) m. A grain that is pressed in "
-                "by half of that comes out on the other side."
-            )
-            told.append(Note(f"walls of {solid.name}", text))
-    for i, obstacle in enumerate(scenario.obstacles):
-        if isinstance(obstacle, SolidMesh):
-            key = f"obstacles.{i}"
-            told += [
-                Note(f"drawing {key} {n}", text)
-                for n, text in enumerate(drawing_notes(obstacle, key))
-            ]
-    return [*told, *_pattern_notes(scenario)]
+    walls = {solid.name: thinnest_wall([solid], smallest_m) for solid in solids}
+    drawn = {f"obstacles.{n}": it for n, it in enumerate(scenario.obstacles)
+             if isinstance(it, SolidMesh)}  # fmt: skip
+    return templates.notes(
+        "plan_sand.j2",
+        hardness=bed_hardness(scenario),
+        least=LEAST_KAPPA,
+        narrow=narrow_spaces(scenario),
+        compiles=registry.calls_our_kernels(scenario) and not are_compiled("dem"),
+        compile_s=COMPILE_S,
+        beyond_reason=[
+            stage
+            for stage in scenario.vibrations
+            if stage.unbalance is None and stage.peak_acceleration_g > HIGH_ACCELERATION_G
+        ],
+        walls={name: wall for name, wall in walls.items() if wall},
+        smallest_m=smallest_m,
+        drawings={key: drawing_notes(it, key) for key, it in drawn.items()},
+        pattern=_pattern_notes(scenario),
+    )
 
 
-def _drive_notes(scenario: Scenario) -> list[Note]:
-    """Accelerations that are hardly meant, such as after a slip in a unit."""
-    return [
-        Note(
-            f"acceleration {n}",
-            f"The box shakes at up to {number(stage.peak_acceleration_g)} g at "
-            f"{number(stage.frequency_hz)} Hz: check the amplitude and its unit.",
-        )
-        for n, stage in enumerate(scenario.vibrations)
-        if stage.unbalance is None and stage.peak_acceleration_g > HIGH_ACCELERATION_G
-    ]
-
-
-def _pattern_notes(scenario: Scenario) -> list[Note]:
+def _pattern_notes(scenario: Scenario) -> list[str]:
     """What was repaired in the drawing of a pattern, and how good its mesh is."""
     if scenario.pattern is None or not isinstance(scenario.pattern.shape, PatternDrawing):
         return []
     from sandmould.pattern_fe.quality import mesh_sentence
     from sandmould.pattern_fe.scene import pattern_of
 
-    said = [
+    return [
         *drawing_notes(scenario.pattern.shape, "pattern.shape"),
         mesh_sentence(scenario, pattern_of(scenario)),
     ]
-    return [Note(f"mesh of the pattern {n}", text) for n, text in enumerate(said)]

@@ -12,13 +12,14 @@ from sandmould.digest import digest
 from sandmould.engines import registry
 from sandmould.engines.durations import grain_steps, run_s, shaken_step_s, stage_steps
 from sandmould.engines.program import build_program
-from sandmould.kinds.kind import BASE_MEMORY_MB, Note, Planning, SpeedClass
+from sandmould.kinds.kind import BASE_MEMORY_MB, Planning, SpeedClass
 from sandmould.kinds.sand.measures import MEASURES
 from sandmould.kinds.sand.notes import notes
 from sandmould.kinds.sand.speed import SandSpeed
 from sandmould.kinds.sand.table_motion import table_lines
 from sandmould.limits import FRAMES, RECORDS
 from sandmould.runs.hashing import scenario_hash
+from sandmould.runs.templates import Note
 from sandmould.scenario.checks.scene import problems as scene_problems
 from sandmould.scenario.pattern import MeshFile, PatternDrawing
 from sandmould.scenario.placement import plan_counts
@@ -205,8 +206,8 @@ class SandPlanning(Planning[Scenario]):
             "steps": f"{self.planned_steps(scenario):,}",
         }
 
-    def notes(self, scenario: Scenario) -> list[Note]:
-        """Hardness, narrow places, thin walls, and what is hardly meant."""
+    def notes(self, scenario: Scenario) -> tuple[Note, ...]:
+        """Stiffness, narrow places, thin walls, and what is hardly meant."""
         return notes(scenario)
 
     def settings_lines(self, scenarios: Iterable[Scenario]) -> list[str]:

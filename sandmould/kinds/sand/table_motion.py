@@ -4,8 +4,9 @@ from __future__ import annotations
 
 from collections.abc import Iterable
 
-from sandmould.kinds.sand.fill_map import best_by_records
+from sandmould.kinds.sand.fill_map import best_by_records, map_error
 from sandmould.runs.formatting import number
+from sandmould.runs.templates import sentences
 from sandmould.scenario.drive import BoxDrive, laid_down_drive
 from sandmould.scenario.scenario import Scenario
 
@@ -28,19 +29,20 @@ def table_lines(scenarios: Iterable[Scenario]) -> list[str]:
         return []
     shown = [_HEADS, *rows[:LISTED_SETTINGS]]
     widths = [max(len(row[i]) for row in shown) for i in range(len(_HEADS))]
-    lines = ["What the settings ask of the table:"]
+    lines = ["Table motion:"]
     lines += [
         "  " + "  ".join(c.rjust(w) for c, w in zip(row, widths, strict=True)) for row in shown
     ]
     if len(rows) > LISTED_SETTINGS:
         lines.append(f"  and {len(rows) - LISTED_SETTINGS} more")
-    empty = ", without sand" if any(stage.unbalance is not None for stage in stages) else ""
-    lines.append(f"  * half of peak to peak{empty}")
-    if any(throws_no_sand(scenario) for scenario in every):
-        lines.append("  Below 1 g the box never throws the sand: expect little.")
-    if foretold := best_by_records(every):
-        lines.append(f"  {foretold}")
-    return lines
+    below = sentences(
+        "plan_table.j2",
+        empty=any(stage.unbalance is not None for stage in stages),
+        weak=any(throws_no_sand(scenario) for scenario in every),
+        best_hz=best_by_records(every),
+        error=map_error(),
+    )
+    return [*lines, *(f"  {line}" for line in below)]
 
 
 def throws_no_sand(scenario: Scenario) -> bool:

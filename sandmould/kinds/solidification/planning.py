@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 import time
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterator, Mapping
 from pathlib import Path
 
 import numpy as np
@@ -14,11 +14,12 @@ from sandmould.casting.arpm import computation, scene, source_hash
 from sandmould.casting.arpm.elements import placed
 from sandmould.casting.arpm.estimates import least_sand_share
 from sandmould.kinds.casting import CastingPlanning
-from sandmould.kinds.kind import BASE_MEMORY_MB, Note, SpeedClass
+from sandmould.kinds.kind import BASE_MEMORY_MB, SpeedClass
 from sandmould.kinds.solidification.notes import notes
 from sandmould.kinds.stored_speed import StoredSpeed
 from sandmould.limits import CELLS, RECORDS
 from sandmould.runs.measures import once, read_groups
+from sandmould.runs.templates import Note
 from sandmould.scenario.casting.shapes import with_file_hash
 from sandmould.scenario.casting.solidification import Solidification
 
@@ -126,7 +127,7 @@ class SolidificationPlanning(CastingPlanning[Solidification]):
             "solid at about": "never" if never else f"{scene.expected_s(scenario):.0f} s",
         }
 
-    def notes(self, scenario: Solidification) -> Sequence[Note]:
+    def notes(self, scenario: Solidification) -> tuple[Note, ...]:
         """What elements and box make of the casting."""
         return notes(scenario)
 

@@ -5,11 +5,11 @@ from __future__ import annotations
 from sandmould.kinds.deck.own.computation import WENT_ON
 from sandmould.report.kinds.kind import Findings, KindPages, KindReport
 from sandmould.report.method import deck_method
-from sandmould.report.sureness import scatter_ground
 from sandmould.report.time_series import curve_figures, measure_curves
 from sandmould.runs.columns import DETAIL
 from sandmould.scenario.own_deck import OwnDeck
 from sandmould.study.collect import Collected
+from sandmould.wording.grounds import scatter_grounds
 
 
 def _notes(
@@ -34,7 +34,7 @@ def _pages(findings: Findings[OwnDeck], film_budget_bytes: int) -> KindPages:
         "the end of the deck's log",
         {"curves": curves},
         curve_figures(curves),
-        grounds=scatter_ground(findings.verdict, "their seed", findings.study.seeks_best),
+        grounds=scatter_grounds(findings.verdict, "seeds", findings.study.seeks_best),
     )
 
 

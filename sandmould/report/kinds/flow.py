@@ -5,6 +5,7 @@ A stability map, noise, histories, fields and films.
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -34,11 +35,11 @@ from sandmould.report.flow_charts import (
 )
 from sandmould.report.kinds.kind import Findings, KindPages, KindReport
 from sandmould.report.method import Row
-from sandmould.report.sureness import Ground
 from sandmould.report.tables import Cell, Column, Table
 from sandmould.report.time_series import measure_curves
 from sandmould.runs.columns import CLASSIFICATION, DETAIL, HOPS, OUTCOME_CODE, RUN
 from sandmould.runs.formatting import listed, name_of, number, setting_text
+from sandmould.runs.templates import notes, sentences, worded
 from sandmould.scenario.casting.flow import MetalFlow, PouredMetal, StillTank
 from sandmould.study.collect import Collected
 from sandmould.wording.next_steps import NextStep
@@ -116,7 +117,12 @@ def _pages(findings: Findings[MetalFlow], film_budget_bytes: int) -> KindPages:
             **numbered("histories", (history.chart for history in histories)),
         },
         answer=next(iter(hopping), "") or _calm(scenario, ranked, keys),
-        grounds=_grounds(scenario),
+        grounds=notes(
+            "flow_grounds.j2",
+            at=scene.deepest(scenario),
+            quiet_pa=QUIET_PA,
+            gradient=scene.scheme_of(scenario).gradient,
+        ),
         steps=_steps(scenario, ranked),
     )
 
@@ -159,44 +165,33 @@ def _sentences(
 ) -> tuple[str, ...]:
     """How many settings hold, and how far their pressure is from rho g h."""
     counts = ranked[CLASSIFICATION].value_counts()
-    parts = [f"{counts.get(s.value, 0)} {s.value}" for s in StabilityRating]
-    said = [f"By the rule of figure 6: {listed(parts)}, of {len(ranked)} runs."]
     name = scene.deepest(scenario)
     errors = pd.to_numeric(ranked[f"{name}_error_pa"], errors="coerce").dropna() if (
         f"{name}_error_pa" in ranked) else pd.Series(dtype=float)  # fmt: skip
-    if len(errors):
-        share = 100.0 / ideal_pa[name]
-        said.append(
-            f"The hydrostatic pressure at {name} is {number(ideal_pa[name], 4)} Pa; the means of "
-            f"runs that held are {number(share * errors.min(), 2)} to "
-            f"{number(share * errors.max(), 2)} % off it."
-        )
-        calm = (pd.to_numeric(ranked[f"{name}_window_sd_pa"]) < QUIET_PA).sum()
-        said.append(
-            "A run is judged by how much the pressure of single steps deviates. Of means over "
-            f"{1e3 * NOISE_WINDOW_S:g} ms it deviates by less than {QUIET_PA:g} "
-            f"Pa in {calm} of {len(ranked)} runs. The paper does not say which of both it means."
-        )
-    return tuple(said)
+    off = 100.0 / ideal_pa[name] * errors
+    return sentences(
+        "flow_found.j2",
+        counts=[f"{counts.get(s.value, 0)} {s.value}" for s in StabilityRating],
+        runs=len(ranked),
+        at=name,
+        ideal_pa=ideal_pa[name],
+        off_percent=(off.min(), off.max()) if len(off) else None,
+        window_ms=1e3 * NOISE_WINDOW_S,
+        quiet_pa=QUIET_PA,
+        calm=(pd.to_numeric(ranked[f"{name}_window_sd_pa"]) < QUIET_PA).sum() if len(off) else 0,
+    )
 
 
 def _calm(scenario: MetalFlow, ranked: pd.DataFrame, keys: Sequence[str]) -> str:
     """At which settings the pressure stays calm, the calmest first."""
-    if ranked.empty:
-        return "No run finished, so there is no answer."
-    labels = [setting_text({key: row[key] for key in keys}) for _, row in ranked.iterrows()]
     verdicts = list(ranked[CLASSIFICATION])
-    # the calmest come first
-    calm = labels[: verdicts.count(StabilityRating.EXCELLENT.value)]
-    stopped = verdicts.count(StabilityRating.FAILED.value)
-    noise_pa = float(pd.to_numeric(ranked[f"{scene.deepest(scenario)}_sd_pa"]).iloc[0])
-    broke = f" {stopped} of {len(labels)} runs broke down." if stopped else ""
-    if not calm:
-        return f"The pressure stays calm at none of {len(labels)} settings.{broke}"
-    where = "all" if len(calm) == len(labels) else f"{len(calm)} of {len(labels)}"
-    return (
-        f"The pressure stays calm at {where} settings, calmest at {calm[0]}: it deviates by "
-        f"{number(noise_pa, 2)} Pa there.{broke}"
+    noise_pa = pd.to_numeric(ranked[f"{scene.deepest(scenario)}_sd_pa"])
+    return worded(
+        "calm.j2",
+        labels=[setting_text({key: row[key] for key in keys}) for _, row in ranked.iterrows()],
+        calm=verdicts.count(StabilityRating.EXCELLENT.value),
+        stopped=verdicts.count(StabilityRating.FAILED.value),
+        noise_pa=next(iter(noise_pa), math.nan),
     )
 
 
@@ -209,37 +204,19 @@ def _steps(scenario: MetalFlow, ranked: pd.DataFrame) -> tuple[NextStep, ...]:
     return (NextStep("Try more relaxations, a smaller c_poi (source_share) or a smaller step."),)
 
 
-def _grounds(scenario: MetalFlow) -> tuple[Ground, ...]:
-    """What calm means, and what the answer rests on."""
-    name = scene.deepest(scenario)
-    return (
-        Ground(
-            "Calm",
-            f"the pressure at {name} deviates by less than {QUIET_PA:g} Pa (standard "
-            "deviation), and no metal hops.",
-        ),
-        Ground("Chance", "nothing in these runs is random: no repeats are needed."),
-        Ground(
-            "Method",
-            "the gradient as the paper prints it makes every run fail; another one, "
-            f"{scene.scheme_of(scenario).gradient}, is used instead.",
-        ),
-    )
-
-
 def _hopping(scenario: MetalFlow, ranked: pd.DataFrame, keys: Sequence[str]) -> tuple[str, ...]:
     """Where metal of a casting hops, and where it does not."""
     if isinstance(scenario.case, StillTank) or HOPS not in ranked:
         return ()
     ended = ranked[ranked[CLASSIFICATION] != StabilityRating.FAILED.value]
-    parts = []
-    for hops, verb in ((1, "hops"), (0, "does not hop")):
-        own = ended[ended[HOPS] == hops]
-        where = [condition_text({key: row[key] for key in keys}) for _, row in own.iterrows()]
-        if where:
-            parts.append(f"it {verb} at {listed(where, most=6)}")
-    sentence = f"When the casting is full, metal that rises faster than {HOP_SPEED_M_S:g} m/s hops"
-    return (f"{sentence}: {'; '.join(parts)}.",) if parts else ()
+    at = {
+        hops: [
+            condition_text({key: row[key] for key in keys})
+            for _, row in ended[ended[HOPS] == hops].iterrows()
+        ]
+        for hops in (0, 1)
+    }
+    return sentences("hopping.j2", hops=at[1], calm=at[0], speed_m_s=HOP_SPEED_M_S)
 
 
 def _noise(scenario: MetalFlow, ranked: pd.DataFrame, keys: Sequence[str]) -> Table:

@@ -16,7 +16,7 @@ from sandmould.report.bed_mode import BedMode
 from sandmould.report.method import Row
 from sandmould.report.repose_figures import Heap
 from sandmould.report.robustness import RobustnessPages
-from sandmould.report.sureness import Ground
+from sandmould.runs.templates import Note
 from sandmould.scenario.drive import BoxDrive
 from sandmould.statistics.answer import Answer
 from sandmould.statistics.verdict import Verdict
@@ -41,7 +41,7 @@ class KindPages:
     """Scripts for the folder ``SPHERES`` beside the page, by file name."""
     answer: str = ""
     """Answers the title's question in one sentence; empty where the objective does."""
-    grounds: tuple[Ground, ...] = ()
+    grounds: tuple[Note, ...] = ()
     """How sure the answer is."""
     steps: tuple[NextStep, ...] = ()
     """What to do next that other kinds do not ask for."""

@@ -8,7 +8,6 @@ import pandas as pd
 
 from sandmould.drawing.chart import Chart
 from sandmould.drawing.figure_files import pictures, strip
-from sandmould.kinds.sand.hardness_text import softness_warning
 from sandmould.report.bed_mode import bed_mode
 from sandmould.report.drive import drive_of
 from sandmould.report.filling import FillingPages, filling_pages
@@ -18,14 +17,15 @@ from sandmould.report.method import measured_when, sand_method
 from sandmould.report.repose_figures import steepest_heaps
 from sandmould.report.robustness import robustness_pages
 from sandmould.report.sand import sand_pages
-from sandmould.report.sureness import sand_grounds, weak_ground
 from sandmould.report.time_series import curve_figures
 from sandmould.runs.columns import LEAST_LIMIT_S, OVERLAP_P99_FRACTION, TIME_STEP_S, finished
 from sandmould.runs.formatting import number
-from sandmould.scenario.hardness import bed_hardness
+from sandmould.runs.templates import worded
+from sandmould.scenario.hardness import DEEP_OVERLAP, LEAST_KAPPA, bed_hardness
 from sandmould.scenario.scenario import Scenario
 from sandmould.study.collect import Collected
 from sandmould.wording.answer import sand_limits
+from sandmould.wording.grounds import sand_grounds
 
 
 def _notes(
@@ -67,10 +67,7 @@ def _pages(findings: Findings[Scenario], film_budget_bytes: int) -> KindPages:
         },
         _sand_figures(pages, filling, bending, loose is not None),
         pages["beside"],
-        grounds=(
-            *sand_grounds(scenario, study, verdict),
-            *weak_ground(findings.scenarios),
-        ),
+        grounds=sand_grounds(scenario, study, verdict, findings.scenarios),
         warning=_softness(scenario, of_sweep.summary),
     )
 
@@ -95,7 +92,13 @@ def _softness(scenario: Scenario, summary: pd.DataFrame) -> str:
     if OVERLAP_P99_FRACTION in summary:
         measured = pd.to_numeric(summary[OVERLAP_P99_FRACTION], errors="coerce")
         deepest = float(measured[finished(summary)].max())
-    return softness_warning(bed_hardness(scenario), deepest)
+    return worded(
+        "too_soft.j2",
+        it=bed_hardness(scenario),
+        least=LEAST_KAPPA,
+        overlap_percent=100 * deepest,
+        deep_percent=100 * DEEP_OVERLAP,
+    )
 
 
 def _sand_figures(

@@ -23,11 +23,11 @@ from sandmould.drawing.figures import png
 from sandmould.kinds.solidification.kind import SolidificationStudy
 from sandmould.report.kinds.kind import Findings, KindPages, KindReport
 from sandmould.report.method import Row
-from sandmould.report.sureness import Ground
 from sandmould.report.tables import Cell, Column, Table
 from sandmould.report.time_series import curve_figures, measure_curves
 from sandmould.runs.columns import CPU_S, RUN, SOLIDIFICATION_TIME_S, TIME_S, finished
 from sandmould.runs.formatting import is_number, listed, name_of, number, seconds, setting_text
+from sandmould.runs.templates import notes, worded
 from sandmould.scenario.casting.solidification import MouldMaterial, Solidification
 from sandmould.statistics.answer import Answer
 from sandmould.statistics.refining import resolution_among
@@ -93,7 +93,11 @@ def _pages(findings: Findings[Solidification], film_budget_bytes: int) -> KindPa
             **curve_figures(curves),
         },
         answer="" if study.seeks_best else _cheapest(errors, reference, collected),
-        grounds=_grounds(bool(stand_ins), scenario),
+        grounds=notes(
+            "casting_grounds.j2",
+            has_stand_ins=bool(stand_ins),
+            dimensions=scenario.dimensions,
+        ),
         steps=() if resolution_among(keys) and not reference else _steps(scenario, bool(reference)),
     )
 
@@ -122,21 +126,6 @@ def _stand_ins(keys: Sequence[str]) -> tuple[str, ...]:
     names = [f"{key.rpartition('.')[0].replace('.', ' ')} {name_of(key)}" for key in keys]
     return (f"Placeholder values, so do not use these times for your alloy: "
             f"{listed(names, most=20)}.",)  # fmt: skip
-
-
-def _grounds(has_stand_ins: bool, scenario: Solidification) -> tuple[Ground, ...]:
-    """What the answer rests on."""
-    values = (
-        "some are placeholders: do not use these times for your alloy."
-        if has_stand_ins
-        else "those of the study's sources."
-    )
-    flat = "two dimensions: heat that leaves across the plane is not counted."
-    return (
-        Ground("Material values", values),
-        Ground("Chance", "nothing in these runs is random: no repeats are needed."),
-        *([Ground("Shape", flat)] if scenario.dimensions == 2 else []),
-    )
 
 
 def _pictured_run(reference: Point, collected: Collected, best: str) -> str:
@@ -169,16 +158,8 @@ def _fields(folder: Path, scenario: Solidification) -> tuple[str, tuple[str, ...
     left, right = figure.subplots(1, 2)
     draw_freezing(fields, frozen, left)
     draw_temperature(fields, frozen, right)
-    said = "Some of the casting is still liquid at the end of the run."
-    if math.isfinite(frozen.solidification_time_s):
-        at = ", ".join(
-            f"{axis} = {number(1e3 * place_m)} mm"
-            for axis, place_m in zip("xyz", frozen.last_point_m, strict=False)
-        )
-        said = (
-            f"The casting is solid after {number(frozen.solidification_time_s)} s; the last "
-            f"point to freeze lies at {at}."
-        )
+    is_solid = math.isfinite(frozen.solidification_time_s)
+    said = worded("frozen.j2", it=frozen, is_solid=is_solid)
     axes = [Column(f"{name}, mm") for name in "yz"[: scenario.dimensions - 1]]
     columns = (Column("hot spot at x, mm"), *axes, Column("frozen after, s"))
     rows = tuple(
@@ -214,20 +195,13 @@ def _cheapest(errors: Sequence[_Error], reference: Point, collected: Collected) 
     if not errors:
         return ""
     near = [e for e in errors if abs(e.time_percent) <= NEAR_PERCENT]
-    of = "of the solidification time of the reference"
-    if not near:
-        nearest = min(errors, key=lambda e: abs(e.time_percent))
-        return (
-            f"No setting comes within {NEAR_PERCENT:g} % {of}: the nearest, {nearest.label}, is "
-            f"{number(abs(nearest.time_percent), 2)} % off it."
-        )
     done = collected.summary[finished(collected.summary)]
-    reference_s = float(_of_point(done, reference)[CPU_S].iloc[0])
-    cheap = near[0]
-    return (
-        f"The cheapest setting within {NEAR_PERCENT:g} % {of} is {cheap.label}: "
-        f"{number(abs(cheap.time_percent), 2)} % off it in {seconds(cheap.cpu_s)} of processor "
-        f"time instead of {seconds(reference_s)}."
+    return worded(
+        "cheapest.j2",
+        near=near[0] if near else None,
+        nearest=min(errors, key=lambda e: abs(e.time_percent)),
+        near_percent=NEAR_PERCENT,
+        reference_s=float(_of_point(done, reference)[CPU_S].iloc[0]),
     )
 
 

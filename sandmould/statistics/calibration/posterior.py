@@ -10,6 +10,7 @@ from functools import lru_cache
 import numpy as np
 from numpy.typing import NDArray
 
+from sandmould.runs.templates import worded
 from sandmould.statistics.calibration.config import Target
 from sandmould.statistics.emulator import Emulator
 
@@ -128,10 +129,8 @@ def posterior(
         variance = se**2 + target.sd**2
         apart = np.abs(target.value - mean) / np.sqrt(variance)
         if float(apart.min()) > 3.0:
-            raise OffTheMapError(
-                f"{measure} = {target.value:g} cannot be calibrated: valid is "
-                f"{mean.min():.4g} to {mean.max():.4g}, what the runs of this map cover"
-            )
+            it = {"measure": measure, "value": target.value, "given": []}
+            raise OffTheMapError(worded("off_the_map.j2", **it, low=mean.min(), high=mean.max()))
         logarithm -= 0.5 * (apart**2 + np.log(variance))
     share = np.exp(logarithm - logarithm.max())
     return Posterior(first, second, share / share.sum())

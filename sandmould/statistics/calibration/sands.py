@@ -13,6 +13,7 @@ import yaml
 
 from sandmould.runs.columns import CPU_S
 from sandmould.runs.files import write_text
+from sandmould.runs.templates import worded
 from sandmould.scenario.quantity import fields_at
 from sandmould.scenario.scenario import Scenario
 from sandmould.statistics.calibration.config import Calibration, TargetSand
@@ -120,10 +121,9 @@ def _calibrate_sand(
 ) -> CalibratedSand:
     missing = [measure for measure in sand.targets if measure not in emulators]
     if missing:
-        valid = f"valid is one of {', '.join(emulators) or 'none'}, what the runs tell"
-        return CalibratedSand(
-            sand, None, None, {}, f"{missing[0]} cannot be calibrated: {valid}"
-        )  # fmt: skip
+        given = list(emulators) or ["nothing"]
+        why = worded("off_the_map.j2", measure=missing[0], value=None, given=given)
+        return CalibratedSand(sand, None, None, {}, why)
     lines = {m: iso_line(emulators[m], target) for m, target in sand.targets.items()}
     first = next(iter(sand.targets))
     assumed = [sand.assumed.get(key) for key in keys]
@@ -152,7 +152,6 @@ def material_text(
     parts = {"sand", "contact", "background_damping"}
     tree: dict[str, Any] = scenario.model_dump(mode="json", include=parts, exclude_none=True)
     targets = [*calibrated.sand.targets.items(), *calibrated.sand.assumed.items()]
-    measured = ", ".join(f"{m} {t.value:g} with sd {t.sd:g}" for m, t in targets)
     for key, value, sd in zip(
         keys, calibrated.posterior.mode, calibrated.posterior.sd, strict=True
     ):
@@ -164,13 +163,12 @@ def material_text(
         section[last] = {
             "value": float(f"{value:.5g}"),
             "unit": str(extra["unit"]) if isinstance(extra, dict) else "1",
-            "source": f"most probable by study {study} for {measured}; posterior sd {sd:.2g}",
+            "source": worded("material.j2", study=study, targets=targets, sd=sd),
         }
-    head = (
-        f"# Written by the study {study}: the sand whose {measured}.\n"
-        f"# Correlation of the two calibrated values: {calibrated.posterior.correlation:.2f}.\n"
-    )
-    return head + yaml.safe_dump(tree, sort_keys=False, allow_unicode=True, width=100)
+    correlation = calibrated.posterior.correlation
+    head = worded("material_head.j2", study=study, correlation=correlation)
+    text = yaml.safe_dump(tree, sort_keys=False, allow_unicode=True, width=100)
+    return f"{head}\n{text}"
 
 
 def write_materials(result: Calibrated, scenario: Scenario, study: str, folder: Path) -> list[Path]:

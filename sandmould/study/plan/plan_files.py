@@ -14,11 +14,11 @@ from pydantic import create_model
 from sandmould.definition.run import FILL, Part, Run
 from sandmould.definition.study import Study
 from sandmould.digest import SHORT, digest
-from sandmould.kinds.kind import Note
 from sandmould.kinds.registry import kind_named, kind_of
 from sandmould.runs.files import write_text
 from sandmould.runs.formatting import size_text
 from sandmould.runs.progress import duration_text
+from sandmould.runs.templates import Note
 from sandmould.scenario.quantity import Section
 from sandmould.scenario.reading import Origin, read_planned, validated
 from sandmould.statistics.control_case import SPRINGS
@@ -284,8 +284,8 @@ def _fills_line(runs: Sequence[Run], fills: Sequence[Run]) -> str:
     state_bytes = sum(kind_of(fill.scenario).planning.state_bytes(fill.scenario) for fill in fills)
     number = "1 fill" if len(fills) == 1 else f"{len(fills)} fills"
     return (
-        f"The {sharing} runs start from {number} of the box. A fill is computed once and serves "
-        f"several runs. Together the fills take about {size_text(state_bytes)} of the disk."
+        f"The {sharing} runs start from {number} of the box, each computed once. Together the "
+        f"fills take about {size_text(state_bytes)} of the disk."
     )
 
 
@@ -294,8 +294,8 @@ def _note_line(told: Sequence[tuple[str, Note]], points: int) -> str:
     label, first = told[0]
     is_one = len({note.text for _, note in told}) == 1
     if points == 1 or (is_one and len(told) == points):
-        return f"{first.head}: {first.text}"
+        return f"{first.about}: {first.text}"
     alike = "" if is_one else ", with other figures at others"
     return (
-        f"{first.head}: {first.text} (At {len(told)} of {points} points{alike}; first at {label}.)"
+        f"{first.about}: {first.text} (At {len(told)} of {points} points{alike}; first at {label}.)"
     )

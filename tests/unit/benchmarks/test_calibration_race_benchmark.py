@@ -147,7 +147,7 @@ def test_a_map_that_cannot_be_used_is_told_in_a_sentence(summary: Path, tmp_path
     with pytest.raises(NoMapError, match="lacks the column heap_angle_deg, so"):
         read_map(bad)
     table.head(4).to_csv(bad, sep="\t", index=False)
-    with pytest.raises(NoMapError, match=r"too small a map: .* known at 2 points"):
+    with pytest.raises(NoMapError, match=r"too small a map: .* known at 2 settings"):
         read_map(bad)
     bad.write_text("", encoding="utf-8")
     with pytest.raises(NoMapError, match="cannot be read as a table"):

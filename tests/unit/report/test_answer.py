@@ -10,7 +10,6 @@ import pytest
 
 from sandmould.kinds.sand.kind import SandStudy
 from sandmould.report.answer import figures_of, table_of
-from sandmould.report.sureness import certificate_ground, sand_grounds, weak_ground
 from sandmould.report.tables import share_of_what_fits
 from sandmould.runs.columns import CROSS_CHECK, OUTCOME_CODE, PART, RUN, SWEEP
 from sandmould.scenario.drive import BoxDrive
@@ -25,7 +24,6 @@ from sandmould.wording.next_steps import (
     with_file,
 )
 from tests.answered import one_value, two_cavities
-from tests.unit.report_study import scenario
 
 KEY = "vibration.0.frequency_hz"
 FILL = "tube_fill_fraction"
@@ -138,29 +136,6 @@ def test_the_end_of_the_sweep_is_next() -> None:
     assert "4 frequencies" in few.text
     (failed,) = failed_steps(["f100_r2"])
     assert failed.command == "sandmould again f100_r2"
-
-
-def test_how_sure_it_is_names_scatter_springs_drive_and_certificate() -> None:
-    verdict = judged(summary(CLEAR)).verdict
-    study = SandStudy.model_validate({"sweep": {"keys": {KEY: [25, 50, 100]}}, "replicates": 3})
-    grounds = (*sand_grounds(scenario(50.0), study, verdict), *certificate_ground(study, None))
-    said = {it.about: it.text for it in grounds}
-    assert said["Scatter"].startswith("3 runs of each setting, alike but for the grains' starting")
-    assert "the means of 50 Hz and 100 Hz differ by 0.20" in said["Scatter"]
-    assert "waves run at 128 m/s" in said["Springs"]
-    assert said["Drive"].startswith("the acceleration stays the same when the frequency changes")
-    assert said["Certificate"].startswith("Three tests of the best frequency have not been run.")
-
-
-def test_settings_below_one_g_are_named_beside_the_answer() -> None:
-    strong = scenario(50.0)
-    (stage,) = strong.vibration[:1]
-    weak = strong.model_copy(
-        update={"vibration": (stage.model_copy(update={"acceleration_g": 0.5}),)}
-    )
-    assert weak_ground({"1.5 g": strong}) == ()
-    (ground,) = weak_ground({"0.5 g": weak, "1.5 g": strong})
-    assert ground.text == "at 0.5 g the box never throws the sand: expect little there."
 
 
 def test_several_things_asked_make_a_table_of_what_trades() -> None:

@@ -1,4 +1,4 @@
-"""The first mode of the bed beside a frequency, and soft sand beside the verdict."""
+"""The first mode of the bed beside a frequency, and grains too soft beside the verdict."""
 
 from __future__ import annotations
 
@@ -69,10 +69,10 @@ def said_beside_the_verdict(folder: Path) -> str:
 
 
 @pytest.mark.slow
-def test_soft_sand_is_told_beside_the_verdict_and_hard_sand_is_not(tmp_path: Path) -> None:
+def test_grains_too_soft_are_told_beside_the_verdict(tmp_path: Path) -> None:
     folder = write_study(tmp_path / "overlaps", count=8, grains=60)
     hard = said_beside_the_verdict(folder)
-    assert "Soft sand" not in hard
+    assert "too soft" not in hard
     assert "50 Hz is 0.13 times c/(4 H) = 389 Hz at the measured depth H of " in hard
     for path in folder.glob("runs/*/measures.tsv"):
         measures = pd.read_csv(path, sep="\t")

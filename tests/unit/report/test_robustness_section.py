@@ -97,7 +97,7 @@ def test_an_artefact_is_the_first_sentence_of_the_report(tmp_path: Path) -> None
     text = (folder / "report.html").read_text(encoding="utf-8")
     said = re.sub(r"<[^>]+>", "", text[text.index('class="verdict') :][:1500]).replace("\xa0", " ")
     said = html.unescape(said[said.index(">") + 1 :].strip())
-    assert said.startswith("The optimum at 50 Hz is an artefact of what is held constant: it moves")
+    assert said.startswith("The optimum at 50 Hz comes from what is held constant: it moves")
     said = html.unescape(text[text.index('id="details"') :])
     assert 'class="verdict unresolved"' in text
     assert "Does the optimum belong to the sand?" in text
@@ -160,7 +160,7 @@ def test_without_a_source_of_the_wave_speed_no_frequency_is_named_first(tmp_path
     assert "times the bed's own first mode, measured by a small shake" in fourth
     swept, answer = collected.of_sweep.summary, judged(collected)
     said, _ = optimum_headline(optimum, pages, answer, swept, has_speed=False)
-    assert said.startswith("No frequency in Hz is named: the best one goes with the hardness")
+    assert said.startswith("No frequency in Hz is named: the best one goes with the wave")
     assert optimum_choice(optimum, swept, answer.verdict, is_artefact=False) == ()
     (step,) = optimum_steps(study, optimum.optimum, pages.assessment)
     assert step.line.startswith("certificate: {sand_wave_speed: {")

@@ -70,7 +70,7 @@ def test_emulator_knows_the_map_between_its_runs_and_its_own_error(replicates: i
 
 
 def test_too_few_points_make_no_emulator() -> None:
-    with pytest.raises(TooFewRunsError, match="known at 5 points, at least 6"):
+    with pytest.raises(TooFewRunsError, match="known at 5 settings, at least 6"):
         fit_emulator("angle", grid(1)[:5], np.ones(5))
 
 
@@ -132,7 +132,7 @@ def test_what_is_taken_for_granted_picks_a_place_on_the_ridge() -> None:
 
 
 def test_a_target_off_the_map_is_told() -> None:
-    with pytest.raises(OffTheMapError, match=r"heap_angle_deg = 60 cannot be calibrated: valid is"):
+    with pytest.raises(OffTheMapError, match=r"heap_angle_deg = 60 cannot be calibrated: the runs"):
         posterior({"heap_angle_deg": emulated()}, {"heap_angle_deg": Target(value=60.0, sd=0.5)})
 
 
@@ -144,12 +144,12 @@ def test_what_cannot_be_calibrated_leaves_the_other_sands(tmp_path: Path) -> Non
     ]
     result = calibrate(Calibration.model_validate({"sands": sands}), runs(), KEYS)
     assert "cannot be calibrated" in result.sands[0].problem
-    assert "colour cannot be calibrated: valid is one of heap" in result.sands[1].problem
+    assert "colour cannot be calibrated: the runs of this map give heap" in result.sands[1].problem
     (written,) = write_materials(result, Scenario(), "a_study", tmp_path)
     tree = yaml.safe_load(written.read_text(encoding="utf-8"))
     friction = tree["contact"]["grain_grain"]["friction"]
     assert friction["unit"] == "1"
-    assert "study a_study for heap_angle_deg 28 with sd 0.5" in friction["source"]
+    assert "study a_study for heap_angle_deg 28 (sd 0.5)" in friction["source"]
     arm = tree["contact"]["grain_grain"]["rolling_arm_fraction"]["value"]
     assert angle_deg(np.array([[friction["value"], arm]]))[0] == pytest.approx(28.0, abs=NOISE_DEG)
 

@@ -58,7 +58,7 @@ def test_wide_spread_is_no_agreement_however_near_the_means() -> None:
     assert found.verdict == "not resolved"
     assert found.more is not None
     assert found.more > 100
-    assert found.note == f"about {found.more} more replicates would be needed at this spread"
+    assert found.note == f"about {found.more} further runs of each would be needed"
 
 
 def test_difference_that_is_seen_but_within_the_margin_is_equivalent() -> None:
@@ -89,7 +89,7 @@ def test_estimate_towards_a_difference_and_none_on_the_margin() -> None:
     assert found.more is not None
     on_margin = agree(values([0.49, 0.52, 0.55]), values([0.5, 0.5, 0.5]), 0.02)
     assert on_margin.more is None
-    assert on_margin.note.startswith(f"more than {MOST_REPLICATES} replicates")
+    assert on_margin.note.startswith(f"more than {MOST_REPLICATES} further runs")
 
 
 def test_only_common_replicates_are_paired() -> None:

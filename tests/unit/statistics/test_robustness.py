@@ -358,7 +358,7 @@ def test_what_is_held_and_the_numerics_are_told_apart(tmp_path: Path) -> None:
     }  # fmt: skip
     both = assessed(tmp_path, {"hold velocity": 30.0, "time_step x0.5": 75.0})
     said = robustness_sentences(both)
-    assert said[0].endswith("is an artefact of the numerics: it moves with time step x0.5.")
+    assert said[0].endswith("comes from the numerics: it moves with time step x0.5.")
     assert said[1] == "It moves up with time step x0.5 and down with velocity held."
 
 

@@ -137,8 +137,8 @@ def test_a_plateau_is_none() -> None:
     assert robustness.springs is not None
     assert [v.dependence for v in robustness.springs.holds] == ["none"] * 3
     assert spring_sentence(robustness.springs.own).startswith(
-        "With the acceleration held there is no inner optimum: no frequency is better than the "
-        "highest one with springs x0.25, x1 and x4 (a drop below 0.0"
+        "With the acceleration held there is no best frequency inside the range: no frequency is "
+        "better than the highest one with springs x0.25, x1 and x4 (a drop below 0.0"
     )
     assert robustness.cause == "no inner optimum"
     assert robustness.is_artefact

@@ -116,7 +116,7 @@ def test_work_of_a_fill_is_counted_once(tmp_path: Path) -> None:
     text = plan_table([*plan.fills, *plan.runs], Prices(), 1)
     assert text.splitlines()[1].startswith("fill ")
     assert "4 runs, " in text
-    assert "The 4 runs start from 2 fills of the box. A fill is computed once" in text
+    assert "The 4 runs start from 2 fills of the box, each computed once." in text
     room = size_text(sum(SAND.planning.state_bytes(fill.scenario) for fill in plan.fills))
     assert f"Together the fills take about {room} of the disk." in text
 

@@ -45,8 +45,7 @@ def plan_of(folder: Path, top: dict[str, Any] | None = None, /, **scenario: Any)
 
 
 def notes_of(folder: Path, **scenario: Any) -> list[str]:
-    lines = plan_of(folder, **scenario).splitlines()
-    return [line.removeprefix("Note: ") for line in lines if line.startswith("Note: ")]
+    return plan_of(folder, **scenario).partition("Wall time on")[2].splitlines()[1:]
 
 
 def test_a_sound_casting_has_no_notes(tmp_path: Path) -> None:
@@ -59,9 +58,8 @@ def test_a_fin_thinner_than_an_element_is_told(tmp_path: Path) -> None:
         [0.0592, 0.12], [0.0592, 0.08], [0.04, 0.08]]}  # fmt: skip
     room = {"low_m": [0.0, 0.0], "high_m": [0.12, 0.16]}
     walls, *_ = notes_of(tmp_path, shapes=[fin], box=room, probes=[], element_m=0.004)
-    assert walls.startswith("The casting has walls thinner than 2 elements of 4 mm. The thinnest "
-                            "measures 1.60 mm, at (0.0")  # fmt: skip
-    assert "33% of the surface" in walls
+    assert walls.startswith("Walls: the thinnest measures 1.60 mm, at (0.0")
+    assert "less than 2 elements of 4 mm. 33 % of the surface belongs to such walls." in walls
     assert "missing from the run" in walls
     resolved = notes_of(tmp_path, shapes=[fin], box=room, probes=[], element_m=0.0008)
     assert resolved == []
@@ -103,14 +101,16 @@ def test_walls_of_a_picture(tmp_path: Path) -> None:
     rows[28:31, 30:58] = 0
     Image.fromarray(rows).save(tmp_path / "disc.png")
     walls, *_ = notes_of(tmp_path, shapes=[picture], box=room, probes=[], element_m=0.002)
-    assert "The thinnest measures 3" in walls
+    assert "the thinnest measures 3" in walls
 
 
 def test_large_elements_in_a_metal_that_melts_at_one_temperature_are_told(tmp_path: Path) -> None:
     scene_ = around(0.08, 0.04) | {"element_m": 0.004}
     pure = {"casting": {"solidus_k": 1750.0, "liquidus_k": 1750.0}}
     (front,) = notes_of(tmp_path, **scene_, **pure, layers=[2])
-    assert front.startswith("The metal melts at one temperature, and layers put elements of 8 mm")
+    assert front.startswith(
+        "Layers: the metal melts at one temperature, and layers put elements of 8 mm"
+    )
     assert notes_of(tmp_path, **scene_, **pure) == []
     assert notes_of(tmp_path, **scene_, layers=[2]) == []
     # too thin for a larger one
@@ -124,7 +124,8 @@ def test_elements_that_hold_another_volume_than_drawn_are_told(tmp_path: Path) -
     assert notes_of(tmp_path, **around(0.04, 0.04), **kernel, element_m=0.004) == []
     # eleven cells a side have their centre inside
     assert notes_of(tmp_path, **off, **kernel, element_m=0.004) == [
-        "The elements hold 4.7% more than the drawn casting: 1\u202f936 instead of 1\u202f849 mm2."
+        "Volume: the elements hold 4.7 % more than the drawn casting: 1\u202f936 instead of "
+        "1\u202f849 mm2."
     ]
     # faces have the drawing's volume, whatever cells are painted
     assert notes_of(tmp_path, **off, element_m=0.004) == []
@@ -138,8 +139,8 @@ def test_elements_that_hold_another_volume_than_drawn_are_told(tmp_path: Path) -
 def test_too_little_sand_is_told(tmp_path: Path) -> None:
     (little,) = notes_of(tmp_path, **around(0.04, 0.01), element_m=0.002)
     # 40 mm squared gives 0.79 of what 60 mm squared less it can take
-    assert little.startswith("There is too little sand: 13.")
-    assert "gives 79% of the heat that this sand can take" in little
+    assert little.startswith("Sand: there is too little, 13.")
+    assert "gives 79 % of the heat that this sand can take" in little
     assert notes_of(tmp_path, **around(0.04, 0.02), element_m=0.002) == []
 
 
@@ -149,7 +150,7 @@ def test_a_box_that_can_never_freeze_the_casting_is_told(tmp_path: Path) -> None
     scenario = {"shapes": [shape], "box": room, "probes": [], "element_m": 0.01}
     (never,) = notes_of(tmp_path, **scenario)
     # by hand: 7200 (272000 + 711 110) J/m3 of 0.006 m2 over 1600 1130 1420 J/m3 of 0.0036 m2
-    assert never.startswith("The casting never freezes in this box, whatever until_s is")
+    assert never.startswith("Sand: the casting never freezes in this box, whatever until_s is")
     assert "gives 1.64 times the heat" in never
     assert "more than 0.00589" in never
     assert "never" in plan_of(tmp_path, **scenario).splitlines()[1]
@@ -166,8 +167,8 @@ def test_a_box_that_can_never_freeze_the_casting_is_told(tmp_path: Path) -> None
 def test_sides_of_the_box_that_the_casting_touches_are_told(tmp_path: Path) -> None:
     half = {"kind": "rectangle", "low_m": [0.0, 0.02], "high_m": [0.02, 0.06]}
     (note,) = notes_of(tmp_path, shapes=[half], probes=[], element_m=0.005)
-    assert note == ("The casting touches the box at its side of low x: it is a plane of symmetry, "
-                    "through which no heat passes.")  # fmt: skip
+    assert note == ("Symmetry: the casting touches the box at low x. No heat passes there, as "
+                    "through a plane of symmetry.")  # fmt: skip
 
 
 @pytest.mark.parametrize("element_m", [0.004, 0.002, 0.001])
@@ -208,7 +209,10 @@ def test_a_shell_that_is_no_cavity_is_told(tmp_path: Path) -> None:
     mesh = {"kind": "mesh", "file": "parts.stl", "unit_m": 0.001}
     room = {"low_m": [0.0, 0.0, 0.0], "high_m": [0.028, 0.028, 0.028]}
     notes = notes_of(tmp_path, shapes=[mesh], box=room, probes=[], element_m=0.002)
-    assert any(note.startswith("shapes.0 has 1 shell that lies in another one") for note in notes)
+    assert any(
+        note.startswith("Drawing shapes.0: shapes.0 has 1 shell that lies in another one")
+        for note in notes
+    )
 
 
 def test_layers_that_break_the_kernels_rule_are_refused_by_the_plan(tmp_path: Path) -> None:
@@ -221,7 +225,7 @@ def test_layers_that_break_the_kernels_rule_are_refused_by_the_plan(tmp_path: Pa
 def test_a_note_of_several_points_is_told_once(tmp_path: Path) -> None:
     sweep = {"sweep": {"keys": {"element_m": [0.002, 0.001]}}}
     lines = plan_of(tmp_path, sweep, **around(0.04, 0.01)).splitlines()
-    (note,) = [line for line in lines if line.startswith("Note: ")]
+    (note,) = [line for line in lines if line.startswith("Sand: ")]
     assert "(At 2 of 2 points" in note
     assert note.endswith("first at element_m_0p002.)")
 
@@ -238,8 +242,8 @@ def test_poured_metal_without_collisions_is_told(tmp_path: Path) -> None:
         path = tmp_path / "pour.yaml"
         path.write_text(yaml.safe_dump(study))
         told[distance] = plan_table(expand(open_study(path)), Prices(), 1)
-    assert "Note: Metal is poured with collision_distance 0." in told[0.0]
-    assert "Note:" not in told[0.8]
+    assert "Collisions: with collision_distance 0 particles" in told[0.0]
+    assert "Collisions:" not in told[0.8]
 
 
 @pytest.mark.parametrize("compiled", [False, True])
@@ -282,11 +286,10 @@ def test_obstacles_thinner_than_a_grain_are_told(
         )
         return plan_table(expand(open_study(path)), Prices(), 1)
 
-    told = [line for line in table(0.0005).splitlines() if line.startswith("Note: ")]
+    told = [line for line in table(0.0005).splitlines() if line.startswith("Walls")]
     assert len(told) == 1
-    assert told[0].startswith("Note: shelf has walls thinner than the smallest grain of ")
-    assert "The thinnest measures 0.500 mm" in told[0]
-    assert "Note: " not in table(0.01)
+    assert told[0].startswith("Walls of shelf: the thinnest measures 0.500 mm, at (0.0")
+    assert "Walls of" not in table(0.01)
 
 
 @pytest.mark.parametrize(("displacement_m", "told"), [(0.05, True), (0.0019, False)])
@@ -297,5 +300,7 @@ def test_a_drive_beyond_reason_is_told(tmp_path: Path, displacement_m: float, to
     stages = [stage | {"duration_s": 0.1}]
     path.write_text(yaml.safe_dump({"based_on": "tube", "scenario": {"vibration": stages}}))
     table = plan_table(expand(open_study(path)), Prices(), 1)
-    sentence = "Note: The box shakes at up to 503 g at 50 Hz: check the amplitude and its unit."
+    sentence = (
+        "Acceleration 1: the box shakes at up to 503 g at 50 Hz: check the amplitude and its unit."
+    )
     assert (sentence in table.splitlines()) is told

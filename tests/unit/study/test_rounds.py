@@ -124,7 +124,7 @@ def test_two_keys_have_one_optimum() -> None:
 
 
 def test_too_few_points_are_no_surface() -> None:
-    with pytest.raises(TooFewRunsError, match="known at 3 points, at least 4 are needed"):
+    with pytest.raises(TooFewRunsError, match="known at 3 settings, at least 4 are needed"):
         found(points=COARSE[:3])
 
 

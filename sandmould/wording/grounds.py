@@ -1,0 +1,68 @@
+"""How sure an answer is, in a few lines: scatter, wave speed, what the table holds, grains."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+
+from sandmould.definition.certificate import frequency_key
+from sandmould.definition.study import Study
+from sandmould.kinds.sand.narrow import narrow_spaces
+from sandmould.kinds.sand.table_motion import throws_no_sand
+from sandmould.runs.formatting import display_number
+from sandmould.runs.templates import Note, notes
+from sandmould.scenario.hardness import bed_hardness
+from sandmould.scenario.scenario import Scenario
+from sandmould.statistics.verdict import Verdict
+
+
+def scatter_grounds(verdict: Verdict, differ_in: str, seeks_best: bool) -> tuple[Note, ...]:
+    """Say how much replicates differ.
+
+    Parameters
+    ----------
+    verdict : Verdict
+    differ_in : str
+        What the replicates of a setting do not share.
+    seeks_best : bool
+        Whether the two best settings are to be compared.
+    """
+    used = [s for s in verdict.settings if s.n]
+    sds = [s.sd for s in used if math.isfinite(s.sd)]
+    sd = math.sqrt(sum(x * x for x in sds) / len(sds)) if sds else math.nan
+    first = verdict.comparisons[0] if verdict.comparisons and seeks_best else None
+    return notes(
+        "scatter.j2",
+        verdict=verdict,
+        runs=[s.n for s in used],
+        differ_in=differ_in,
+        sd=display_number(verdict.measure, sd, 2) if sds else "",
+        first=first if first and first.tested and verdict.best else None,
+    )
+
+
+def sand_grounds(
+    scenario: Scenario, study: Study, verdict: Verdict, by_setting: Mapping[str, Scenario]
+) -> tuple[Note, ...]:
+    """Say how sure the answer of a study of sand is.
+
+    Parameters
+    ----------
+    scenario : Scenario
+        Of the run that is shown.
+    study : Study
+    verdict : Verdict
+    by_setting : mapping of str to Scenario
+        By label of the setting.
+    """
+    vibrations = scenario.vibrations
+    return scatter_grounds(verdict, "random fillings", study.seeks_best) + notes(
+        "sand_grounds.j2",
+        of_frequency=study.seeks_best and frequency_key(study.sweep),
+        hardness=bed_hardness(scenario),
+        sand=study.certificate.sand_wave_speed,
+        hold=vibrations[0].hold if vibrations else "",
+        narrow=narrow_spaces(scenario),
+        scale=scenario.sand.size_scale,
+        weak=[label for label, each in by_setting.items() if throws_no_sand(each)],
+    )
