@@ -80,6 +80,7 @@ def _typical_rate(session: Session) -> float:
 def _window_rate(session: Session) -> float:
     """Grain-steps per second of a core over a moment."""
     steps, begun_s = session.steps, _spent_s()
+    session.advance()  # once at least: another thread may use up a short window
     while _spent_s() - begun_s < WINDOW_S:
         session.advance()
     return session.grains * (session.steps - steps) / (_spent_s() - begun_s)

@@ -57,9 +57,7 @@ def test_a_drawn_bracket_is_foam_where_it_is_put(file: Path, unit_m: float) -> N
     np.testing.assert_allclose(low_m - PLACE, [-0.03, -0.03, -0.008], atol=2e-3)
     assert scenario.pattern is not None
     assert len(getattr(scenario.pattern.shape, "sha256", "")) == 64
-    (note,) = [
-        n.text for n in SAND.planning.notes(scenario) if n.about.startswith("mesh of the pattern")
-    ]
+    (note,) = [n.text for n in SAND.planning.notes(scenario) if n.about == "Drawing of the pattern"]
     assert (note,) == drawing_sentences(scenario) == (mesh_sentence(scenario, pattern),)
     assert f"{pattern.space.mesh.nelements} tetrahedra of 16" in note
     assert SAND.planning.memory_mb(scenario) > BASE_MEMORY_MB
