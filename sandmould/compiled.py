@@ -43,8 +43,8 @@ def njit(**options: Any) -> Callable[[_Function], _Function]:
 
     def compiled(function: _Function) -> _Function:
         # C code calls none of them: a face for it would be a tenth of the time of compiling.
-        told = {"cache": KEEPS, "no_cfunc_wrapper": True} | options
-        dispatcher: Any = _saved_alone(numba.njit(**told)(function))
+        chosen = {"cache": KEEPS, "no_cfunc_wrapper": True} | options
+        dispatcher: Any = _saved_alone(numba.njit(**chosen)(function))
         if not options.get("parallel"):  # loading one of these may start threads
             DISPATCHERS[f"{function.__module__}.{function.__qualname__}"] = dispatcher
         return dispatcher

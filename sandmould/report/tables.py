@@ -181,7 +181,7 @@ def settings_table(verdict: Verdict, drives: Mapping[str, BoxDrive]) -> Table:
         against = verdict.against(setting)
         is_best = verdict.best is not None and setting.label == verdict.best.label
         interval, p, difference = "–", math.nan, math.nan
-        standing = "best" if is_best else "no run"
+        standing = "best mean" if is_best else "no run"
         if against is not None:
             difference, p = against.difference, against.p
             standing = "not tested"

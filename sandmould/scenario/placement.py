@@ -183,10 +183,11 @@ def layer_classes(s: Scenario, number: int, count: int) -> NDArray[np.int64]:
     """Classes of the grains that ``plan_layer`` places, found without their places."""
     if s.fill.grains and number == 1:
         return placed_grains(s).class_number
-    return _draw_classes(s, count, _drawing(s, number))
+    return _draw_classes(s, count, _layer_rng(s, number))
 
 
-def _drawing(s: Scenario, number: int) -> np.random.Generator:
+def _layer_rng(s: Scenario, number: int) -> np.random.Generator:
+    """Random numbers of a layer: its classes are drawn first, then its places."""
     return np.random.default_rng([s.seed, number])
 
 
@@ -202,7 +203,7 @@ def plan_layer(s: Scenario, number: int, count: int) -> PlannedLayer:
     """
     if s.fill.grains and number == 1:
         return placed_grains(s)
-    rng = _drawing(s, number)
+    rng = _layer_rng(s, number)
     drawn = np.sort(_draw_classes(s, count, rng))[::-1]
     diameters = {c.number: c.diameter_m for c in s.sand.classes(s.dimension)}
     radius = np.array([diameters[c] for c in drawn]) / 2
