@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterable
-from typing import Annotated, Any, ClassVar
+from typing import TYPE_CHECKING, Annotated, Any, ClassVar
 
 from pydantic import Field
 
@@ -17,6 +17,9 @@ from sandmould.scenario.quantity import NAME, Section, quantity
 from sandmould.scenario.sand import ARGUED
 from sandmould.statistics.calibration.config import Calibration
 from sandmould.statistics.config import Equivalence, Objective
+
+if TYPE_CHECKING:
+    from sandmould.statistics.answer import SweepEnd
 
 
 class CrossCheck(Section):
@@ -121,6 +124,14 @@ class Study(Section):
     def more_folders(self) -> tuple[str, ...]:
         """Folders, seen from ROOT, that such a program's files may lie in beside its own."""
         return ()
+
+    def table_limit(self, scenario: Any) -> str:
+        """Key of the limit of the user's table that a setting lies beyond; empty where none."""
+        return ""
+
+    def table_limit_at(self, end: SweepEnd) -> str:
+        """Key of the limit that keeps the table from going beyond an end of the sweep."""
+        return ""
 
     def problems(self) -> Iterable[Problem]:
         """What is wrong with the sections that only its kind has, where the sweep is sound."""

@@ -158,7 +158,8 @@ def _page(study_folder: Path, home: Path, study: Study, collected: Collected) ->
         if s.label in drives
     }
     stand_ins = _stand_ins(study_folder, summary[RUN], kind_named(study.kind).material)
-    answer = decide(asked, Evidence(summary, collected.of_sweep.curves, of_varied, stand_ins))
+    curves = collected.of_sweep.curves
+    answer = decide(asked, Evidence(summary, curves, of_varied, stand_ins, study.table_limit_at))
     relative = os.path.relpath(study_folder.absolute(), home)
     href = "" if relative == "." else quote(Path(relative).as_posix()) + "/"
     scenario = _scenario_of(study_folder, [pictured_run] if pictured_run else []) or any_scenario

@@ -12,7 +12,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from sandmould.scenario.vibration import STANDARD_GRAVITY_M_S2, VibrationStage
+from sandmould.scenario.vibration import STANDARD_GRAVITY_M_S2, Shaking, VibrationStage
 
 DISPLACEMENT, VELOCITY, ACCELERATION = (
     "drive_displacement_m", "drive_velocity_m_s", "drive_acceleration_g"
@@ -55,8 +55,8 @@ class BoxDrive:
         }
 
 
-def laid_down_drive(stage: VibrationStage) -> BoxDrive:
-    """The motion at full amplitude of a stage that lays it down."""
+def laid_down_drive(stage: Shaking) -> BoxDrive:
+    """The motion at full amplitude of what lays it down; of a table on mounts, without sand."""
     return BoxDrive(stage.frequency_hz, stage.amplitude_m)
 
 

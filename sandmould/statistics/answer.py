@@ -77,6 +77,8 @@ class Answer:
     """That of them which reaches it first, where the runs tell."""
     shortest_s: float = 0.0
     ends: tuple[SweepEnd, ...] = ()
+    table_ends: tuple[SweepEnd, ...] = ()
+    """Ends beyond which the user's table cannot go."""
     further_runs: int | None = None
     """More runs of each open setting that would decide; None where no number would."""
     numerical_error: float | None = None

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 
 import pandas as pd
@@ -36,6 +36,8 @@ class Evidence:
     """How the box moves, by label of the setting."""
     stand_ins: tuple[str, ...] = ()
     """Keys of values that are not what they stand for."""
+    table_limit_at: Callable[[SweepEnd], str] = lambda end: ""
+    """Key of the limit of the user's table that lies there; empty where it can go beyond."""
 
 
 def decide(asked: Asked, evidence: Evidence) -> Answer:
@@ -118,10 +120,12 @@ def _with_limits(
     """With the ends of the sweep, what further runs would do, and how the best one went on."""
     best, verdict = answer.best, answer.verdict
     assert best is not None
+    ends = _ends(best, answer.used, answer.asked.keys)
     known = [errors.get(s.label) for s in (best, verdict.runner_up) if s is not None]
     return replace(
         answer,
-        ends=_ends(best, answer.used, answer.asked.keys),
+        ends=tuple(end for end in ends if not evidence.table_limit_at(end)),
+        table_ends=tuple(end for end in ends if evidence.table_limit_at(end)),
         further_runs=further_replicates(verdict.comparisons, best),
         numerical_error=None if None in known else sum(e for e in known if e is not None),
         passage=passage_of(

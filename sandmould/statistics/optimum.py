@@ -11,6 +11,7 @@ import numpy as np
 import pandas as pd
 from numpy.typing import NDArray
 
+from sandmould.statistics.answer import SweepEnd
 from sandmould.statistics.config import Better
 from sandmould.statistics.emulator import Array, Emulator, fit_emulator
 from sandmould.statistics.evidence import usable_values
@@ -72,13 +73,17 @@ class Optimum:
         low, high = np.quantile(chosen, ends, method="inverted_cdf")
         return float(low), float(high)
 
-    def at_end(self, key: str) -> str:
-        """The end of the swept range that the interval reaches: lowest, highest, both or none."""
-        place = self.keys.index(key)
-        ends = self.points[:, place].min(), self.points[:, place].max()
+    def reached(self, key: str) -> list[SweepEnd]:
+        """The ends of the swept range that the interval reaches."""
+        values = self.points[:, self.keys.index(key)]
         low, high = self.interval(key)
-        reached = [n for n, at in (("lowest", low == ends[0]), ("highest", high == ends[1])) if at]
-        return " and ".join(reached)
+        lowest = [SweepEnd(key, low, False)] if low == values.min() else []
+        return lowest + ([SweepEnd(key, high, True)] if high == values.max() else [])
+
+    def at_end(self, key: str) -> str:
+        """Those ends by name: lowest, highest, both or none."""
+        ends = ("highest" if end.is_highest else "lowest" for end in self.reached(key))
+        return " and ".join(ends)
 
     def no_worse(self, key: str, margin: float) -> tuple[float, float]:
         """Values of a key around the best, the others held, that lose less than a margin."""

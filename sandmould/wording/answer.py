@@ -293,6 +293,12 @@ class AnswerWords:
         """What the placeholder values belong to."""
         return listed(sorted({key.partition(".")[0] for key in self.answer.stand_ins}))
 
+    @property
+    def stand_in_of(self) -> str:
+        """What a user has of his own in their place."""
+        is_sand = any(key.startswith(("sand.", "contact.")) for key in self.answer.stand_ins)
+        return "sand" if is_sand else "alloy"
+
     @cached_property
     def others(self) -> tuple[AnswerWords, ...]:
         """The other cavities and the pattern."""

@@ -184,8 +184,10 @@ def optimum_steps(
         return [step("settings")]
     steps = []
     for key in optimum.keys:
-        if end := optimum.at_end(key):
-            side = {"lowest": "below", "highest": "above"}.get(end, "on both sides of")
+        untried = [end for end in optimum.reached(key) if not study.table_limit_at(end)]
+        if untried:
+            one = "above" if untried[0].is_highest else "below"
+            side = one if len(untried) == 1 else "on both sides of"
             steps.append(step("outside", a_key=_a(name_of(key)), side=side))
     low_high = {key: optimum.interval(key) for key in study.refine.interval}
     if any(high - low > study.refine.interval[k] for k, (low, high) in low_high.items()):

@@ -2,16 +2,26 @@
 
 from __future__ import annotations
 
-from typing import Literal
+from typing import TYPE_CHECKING, Literal
 
 from pydantic import Field
 
 from sandmould.definition.study import Study, kind_key
+from sandmould.definition.table import VibratingTable
 from sandmould.kinds.kind import Kind, opened_later
 from sandmould.scenario.contact import BackgroundDamping, Contact
+from sandmould.scenario.drive import laid_down_drive
 from sandmould.scenario.quantity import Section
 from sandmould.scenario.sand import Sand
 from sandmould.scenario.scenario import Scenario
+from sandmould.scenario.vibration import VibrationStage
+
+if TYPE_CHECKING:
+    from sandmould.statistics.answer import SweepEnd
+
+
+FARTHER = 1.01
+"""Beyond an end of the sweep by this factor, a table is asked whether it can go on."""
 
 
 class SandStudy(Study):
@@ -21,6 +31,27 @@ class SandStudy(Study):
     scenario: Scenario = Field(
         Scenario(), description="Scene of sand: box, obstacles, fill, vibration."
     )
+    table: VibratingTable = Field(
+        VibratingTable(), description="What your table can do: settings beyond it are left out."
+    )
+
+    def table_limit(self, scenario: Scenario) -> str:
+        """See ``Study``; a vibration during the fill counts too."""
+        shakings = (*scenario.fill.shakings, *scenario.vibrations)
+        limits = (self.table.limit_beyond(laid_down_drive(each)) for each in shakings)
+        return next(filter(None, limits), "")
+
+    def table_limit_at(self, end: SweepEnd) -> str:
+        """See ``Study``; of a swept number of a stage of vibration."""
+        section, _, name = end.key.rpartition(".")
+        number = section.removeprefix("vibration.")
+        stages = dict(enumerate(self.scenario.vibration))
+        stage = stages.get(int(number)) if number.isdecimal() else None
+        if not isinstance(stage, VibrationStage):
+            return ""
+        farther = end.value * (FARTHER if end.is_highest else 1.0 / FARTHER)
+        drive = laid_down_drive(stage.model_copy(update={name: farther}))
+        return self.table.limit_beyond(drive)
 
 
 class Material(Section):

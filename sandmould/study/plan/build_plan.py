@@ -17,6 +17,7 @@ from sandmould.bad_input import BadInputError, Problem
 from sandmould.definition.certificate import provisional_hz
 from sandmould.definition.comparing import ENGINE
 from sandmould.definition.run import Run
+from sandmould.definition.sweep import Point, points
 from sandmould.kinds.kind import AnyScenario, Kind, Planning, SpeedClass
 from sandmould.kinds.registry import kind_named
 from sandmould.runs.words import say
@@ -28,7 +29,13 @@ from sandmould.study.plan.later_key import at_later_key
 from sandmould.study.plan.load_study import OpenStudy, StudyFile, study_files, study_of
 from sandmould.study.plan.measured import problems_elsewhere
 from sandmould.study.plan.ownership import check_owner, write_owner
-from sandmould.study.plan.plan_files import later_line, plan_table, write_plan, write_study
+from sandmould.study.plan.plan_files import (
+    beyond_line,
+    later_line,
+    plan_table,
+    write_plan,
+    write_study,
+)
 from sandmould.study.plan.price import Prices, computed_wall_s, ratios_of
 from sandmould.study.plan.trust import check_letters, check_places, check_trust, may_run
 from sandmould.study.rounds.round_log import read_rounds
@@ -74,6 +81,15 @@ class Plan:
         speed_class = self.kind.planning.speed_class
         left = [run for run in self.runs if run.run in lacking]
         return list({speed_class(run.scenario): run for run in reversed(left)}.values())
+
+    @property
+    def beyond_table(self) -> list[Point]:
+        """Points of the sweep that are left out, since the user's table cannot do them."""
+        sweep = self.study.study.sweep
+        kept = [run.parameters for run in self.runs if run.part == "sweep"]
+        if len({str(p) for p in kept}) >= sweep.number_of_points:
+            return []
+        return [p for p in points(sweep, self.study.study.scenario) if p not in kept]
 
     @cached_property
     def _by_name(self) -> dict[str, Run]:
@@ -375,8 +391,10 @@ def writing(folder: Path, key: str = "results") -> Iterator[None]:
 def price(plan: Plan, results: Path, cores: int) -> str:
     """Say what the runs will take, as far as the machine's speed is known at what was measured."""
     prices = known_prices(plan, results)
-    return plan_table([*plan.fills, *plan.runs], prices, cores) + later_line(
-        plan.later, prices, cores
+    return (
+        plan_table([*plan.fills, *plan.runs], prices, cores)
+        + beyond_line(plan.beyond_table)
+        + later_line(plan.later, prices, cores)
     )
 
 

@@ -16,6 +16,7 @@ from sandmould.definition.sweep import Point, points, value_at
 from sandmould.kinds.kind import AnyScenario
 from sandmould.kinds.registry import kind_named
 from sandmould.runs.columns import CROSS_CHECK, CROSS_CHECK_OWN
+from sandmould.runs.formatting import setting_text
 from sandmould.runs.hashing import by_name, scenario_hash
 from sandmould.scenario.quantity import Section
 from sandmould.scenario.reading import Origin, Tree, merge, validated
@@ -86,8 +87,12 @@ def expand(
                       if step in swept_steps(certificate)}  # fmt: skip
     seeds = range(1, SEEDS + 1)
     added += [(point, seeds) for point in controlled.values()]
+    beyond: list[_AtPoint] = []
     for point, replicates in (*swept, *added):
         at_point = _AtPoint(study, base, point, labels, measured)
+        if replicates is every and at_point.table_limit:
+            beyond.append(at_point)
+            continue
         for problem in map(study.as_written, at_point.problems):
             problems[str(problem)] = problem
         if len(problems) >= MOST_PROBLEMS:
@@ -114,6 +119,9 @@ def expand(
             scenario, wrong = at_point.changed(case)
             problems |= {str(problem): problem for problem in wrong}
             runs |= {run.run: run for run in at_point.control(case, scenario, seeds)}
+    checked_at = study.study.cross_check and study.study.cross_check.at
+    of_table = [p for p in beyond if not runs or p.point == checked_at]
+    problems |= {str(p): p for p in (each.table_problem() for each in of_table[:1])}
     if problems:
         raise BadInputError(list(problems.values())[:MOST_PROBLEMS])
     return list(runs.values())
@@ -163,6 +171,20 @@ class _AtPoint:
             self.problems = [self._at_swept_key(p) for p in error.problems]
         else:
             self.problems = [self._at_changed_key(p) for p in self._misfits(self.scenario)]
+
+    @property
+    def table_limit(self) -> str:
+        """Key of the limit of the user's table that the point lies beyond; empty where none."""
+        if self.scenario is None or self.problems:
+            return ""
+        return self.study.study.table_limit(self.scenario)
+
+    def table_problem(self) -> Problem:
+        """Why the table cannot do the point."""
+        key = f"table.{self.table_limit}"
+        valid = f"a limit that allows {setting_text(self.point) or 'the motion of the scenario'}"
+        value = value_at(self.study.study.model_dump(mode="json"), key)
+        return Problem(key, value, valid, self.study.origin.file_of(key))
 
     def _scenario(self, point: Point, origin: Origin) -> Any:
         tree = self.base

@@ -13,10 +13,11 @@ from pydantic import create_model
 
 from sandmould.definition.run import FILL, Part, Run
 from sandmould.definition.study import Study
+from sandmould.definition.sweep import Point
 from sandmould.digest import SHORT, digest
 from sandmould.kinds.registry import kind_named, kind_of
 from sandmould.runs.files import write_text
-from sandmould.runs.formatting import size_text
+from sandmould.runs.formatting import listed, setting_text, size_text
 from sandmould.runs.progress import duration_text
 from sandmould.runs.templates import Note
 from sandmould.scenario.quantity import Section
@@ -252,6 +253,14 @@ def plan_table(runs: Sequence[Run], prices: Prices, cores: int) -> str:
     lines += planning.settings_lines(settings)
     lines += [_note_line(told, len(settings)) for told in notes.values()]
     return "\n".join(line.rstrip() for line in lines) + "\n"
+
+
+def beyond_line(left_out: Sequence[Point]) -> str:
+    """Which points of a sweep the user's table cannot do, as a line; empty without any."""
+    if not left_out:
+        return ""
+    told = listed([setting_text(point) for point in left_out], most=LISTED_POINTS)
+    return f"Left out, since your table cannot do it: {told}.\n"
 
 
 def later_line(later: Sequence[Run], prices: Prices, cores: int) -> str:

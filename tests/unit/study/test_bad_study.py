@@ -23,7 +23,7 @@ CASES: dict[str, tuple[str | bytes, str]] = {
         "based_on: tube\nstrength: 1",
         "trial.yaml: strength = 1 cannot be used: valid is one of the keys based_on, calibration, "
         "certificate, cross_check, equivalence, kind, material, objective, own_measures, refine, "
-        "replicates, scenario, sweep, title.",
+        "replicates, scenario, sweep, table, title.",
     ),
     "swept mesh that is not there": (
         "based_on: bracket\nsweep: {keys: {obstacles.0.file: [absent.stl]}}",

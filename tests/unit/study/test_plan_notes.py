@@ -265,7 +265,7 @@ def test_what_is_to_be_compiled_is_told_once(
     )
     said = plan_table(expand(open_study(path)), Prices(), 1)
     # LAMMPS computes this scene alone
-    told = "about 25 s of a core more, once. (At 2 of 4 points; first at engine_reference_"
+    told = "about 55 s of a core more, once. (At 2 of 4 points; first at engine_reference_"
     assert said.count("compiled") == (0 if compiled else 1)
     assert (told in said) != compiled
 
