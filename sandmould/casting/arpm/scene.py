@@ -78,14 +78,13 @@ def _size_fault(
 
 
 @lru_cache(maxsize=8)
-def _cooled(box: Rectangle, shapes: tuple[Any, ...], element_m: float, of_kernel: bool) -> Cooled:
-    return cooled((_raster if of_kernel else _drawn)(box, shapes, element_m))
+def _cooled(box: Rectangle, shapes: tuple[Any, ...], element_m: float) -> Cooled:
+    return cooled(_drawn(box, shapes, element_m))
 
 
 def cooled_of(scenario: Solidification) -> Cooled:
     """The casting as its sand sees it; ValueErrors are those of ``painted``."""
-    of_kernel = scenario.exchange in KERNEL_FORMS
-    return _cooled(scenario.box, scenario.shapes, scenario.element_m, of_kernel)
+    return _cooled(scenario.box, scenario.shapes, scenario.element_m)
 
 
 def raster_of(scenario: Solidification) -> Raster:

@@ -37,6 +37,7 @@ def notes(scenario: Solidification) -> tuple[Note, ...]:
         "plan_solidification.j2",
         scenario=scenario,
         it=it,
+        until_s=scenario.until_s,
         share=share,
         least_sand_m3=heat_to_lose_j_m3(scenario) * it.volume_m3 / sand_takes_j_m3(scenario),
         times_s=_times_s(scenario, it) if share < 1.0 else None,

@@ -138,8 +138,8 @@ def test_elements_that_hold_another_volume_than_drawn_are_told(tmp_path: Path) -
 
 def test_too_little_sand_is_told(tmp_path: Path) -> None:
     (little,) = notes_of(tmp_path, **around(0.04, 0.01), element_m=0.002)
-    # 40 mm squared gives 0.79 of what 60 mm squared less it can take
-    assert little.startswith("Sand: there is too little, 13.")
+    # 40 mm squared gives 0.79 of what 60 mm squared less it can take, 2 000 mm2 over 160 mm
+    assert little.startswith("Sand: there is too little, 12.5 mm on average")
     assert "gives 79 % of the heat that this sand can take" in little
     assert notes_of(tmp_path, **around(0.04, 0.02), element_m=0.002) == []
 
@@ -223,11 +223,11 @@ def test_layers_that_break_the_kernels_rule_are_refused_by_the_plan(tmp_path: Pa
 
 
 def test_a_note_of_several_points_is_told_once(tmp_path: Path) -> None:
-    sweep = {"sweep": {"keys": {"element_m": [0.002, 0.001]}}}
+    sweep = {"sweep": {"keys": {"heat_transfer_w_m2_k": [200, 800]}}}
     lines = plan_of(tmp_path, sweep, **around(0.04, 0.01)).splitlines()
     (note,) = [line for line in lines if line.startswith("Sand: ")]
     assert "(At 2 of 2 points" in note
-    assert note.endswith("first at element_m_0p002.)")
+    assert note.endswith("first at heat_transfer_w__200.)")
 
 
 def test_poured_metal_without_collisions_is_told(tmp_path: Path) -> None:
