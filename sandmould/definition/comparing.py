@@ -7,14 +7,14 @@ from collections.abc import Iterator
 from sandmould.bad_input import Problem
 from sandmould.definition.study import CrossCheck, Study
 from sandmould.definition.sweep import Sweep, points
-from sandmould.statistics.config import FULL, Equivalence, Objective
+from sandmould.statistics.config import FULL, Aim, Equivalence, Objective
 
 ENGINE = "engine.name"
 
 
 def problems(study: Study) -> list[Problem]:
     """List what is wrong with the comparisons of a study whose sweep has no problems."""
-    misfits = [*_target(study.objective), *_equivalence(study.equivalence, study.sweep)]
+    misfits = [*_objective(study.objective), *_equivalence(study.equivalence, study.sweep)]
     if study.cross_check is not None:
         misfits += _cross_check(study.cross_check, study)
     compares = bool(study.equivalence.keys) or study.cross_check is not None
@@ -24,24 +24,36 @@ def problems(study: Study) -> list[Problem]:
     return misfits
 
 
-def _target(objective: Objective) -> Iterator[Problem]:
+def _objective(objective: Objective) -> Iterator[Problem]:
+    """Every aim has a measure of its own, and those beside the first have a better side."""
+    yield from _target(objective, "objective")
+    told = [objective.measure]
+    for i, aim in enumerate(objective.beside):
+        key = f"objective.beside.{i}"
+        if aim.measure in told:
+            yield Problem(f"{key}.measure", aim.measure, "each measure once")
+        if "neither" in (aim.better, objective.better):
+            yield Problem(f"{key}.better", aim.better, "larger or smaller, for each measure")
+        yield from _target(aim, key)
+        told.append(aim.measure)
+
+
+def _target(aim: Aim, key: str) -> Iterator[Problem]:
     """A target needs a better side, and lies on the scale of its measure."""
-    target = objective.target
+    target = aim.target
     if target is None:
         return
     valid = ""
-    if objective.better == "neither":
-        valid = "absent where objective.better is neither"
-    elif target == FULL and not (objective.is_fill and objective.better == "larger"):
-        valid = f"a value of {objective.measure}: {FULL} is for the fill of a tube or cavity"
+    if aim.better == "neither":
+        valid = f"absent where {key}.better is neither"
+    elif target == FULL and not (aim.is_fill and aim.better == "larger"):
+        valid = f"a value of {aim.measure}: {FULL} is for the fill of a tube or cavity"
     elif (
-        isinstance(target, float)
-        and objective.measure.endswith("_fraction")
-        and not 0.0 < target <= 1.0
+        isinstance(target, float) and aim.measure.endswith("_fraction") and not 0.0 < target <= 1.0
     ):
         valid = "above 0 and at most 1"
     if valid:
-        yield Problem("objective.target", target, valid)
+        yield Problem(f"{key}.target", target, valid)
 
 
 def _equivalence(equivalence: Equivalence, sweep: Sweep) -> Iterator[Problem]:

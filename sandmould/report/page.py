@@ -150,7 +150,9 @@ def _page(study_folder: Path, home: Path, study: Study, collected: Collected) ->
                 by_setting[label] = own, summary.iloc[rows]
     by_lot = kind_named(study.kind).draws_by_lot
     varied = tuple(key for key in keys if summary[key].astype(str).nunique() > 1)
-    asked = Asked(objective.measure, objective.better, varied, objective.goal, by_lot)
+    asked = Asked(
+        objective.measure, objective.better, varied, objective.goal, by_lot, objective.beside
+    )
     drives = _drives(by_setting)
     of_varied = {
         setting_text({key: s.values[key] for key in varied}): drives[s.label]

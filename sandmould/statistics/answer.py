@@ -10,7 +10,7 @@ from dataclasses import dataclass, field
 from enum import StrEnum
 
 from sandmould.scenario.drive import BoxDrive
-from sandmould.statistics.config import Better, Goal
+from sandmould.statistics.config import Aim, Better, Goal
 from sandmould.statistics.over_time import Passage
 from sandmould.statistics.refining import Refining
 from sandmould.statistics.settings import Setting
@@ -50,6 +50,8 @@ class Asked:
     goal: Goal | None = None
     by_lot: bool = True
     """Whether runs of one setting differ by their seeds."""
+    beside: tuple[Aim, ...] = ()
+    """What the settings should do well besides."""
 
 
 @dataclass(frozen=True)

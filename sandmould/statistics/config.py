@@ -33,8 +33,8 @@ class Reported(Section):
     by: str = quantity(..., "Who reports it, and where.", source="user")
 
 
-class Objective(Section):
-    """What makes one setting better than another."""
+class Aim(Section):
+    """A measure, and which of its values are better, or good enough."""
 
     measure: str = quantity(
         "tube_fill_fraction",
@@ -54,10 +54,6 @@ class Objective(Section):
         unit="of the column",
         source=ARGUED,
     )
-    reported: Reported | None = Field(None, description="What the measure is compared with.")
-    reported_best: tuple[Reported, ...] = Field(
-        (), description="Values of the one swept key that others have found best."
-    )
 
     @property
     def is_fill(self) -> bool:
@@ -72,6 +68,20 @@ class Objective(Section):
         if not self.is_fill or self.better != "larger":
             return None
         return Goal(filled_space(self.measure) + OF_BED, FULL_SHARE)
+
+
+class Objective(Aim):
+    """What makes one setting better than another."""
+
+    beside: tuple[Aim, ...] = Field(
+        (),
+        description="What the settings should do well besides. The other cavities and the tip of a "
+        "pattern are judged unasked.",
+    )
+    reported: Reported | None = Field(None, description="What the measure is compared with.")
+    reported_best: tuple[Reported, ...] = Field(
+        (), description="Values of the one swept key that others have found best."
+    )
 
 
 class SandWaveSpeed(Section):

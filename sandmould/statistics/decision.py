@@ -12,7 +12,7 @@ from sandmould.runs.columns import OF_RUN, RUN
 from sandmould.runs.formatting import OF_BED, filled_space, is_number, setting_text
 from sandmould.scenario.drive import BoxDrive
 from sandmould.statistics.answer import Answer, Asked, Decided, SweepEnd
-from sandmould.statistics.config import FULL_SHARE, Goal
+from sandmould.statistics.config import Aim, Goal
 from sandmould.statistics.evidence import left_out_counts, one_way_runs, usable_values
 from sandmould.statistics.over_time import passage_of, reached_s
 from sandmould.statistics.refining import Refining, refining_of, resolution_among
@@ -56,13 +56,14 @@ def decide(asked: Asked, evidence: Evidence) -> Answer:
 
 
 def _asked_beside(asked: Asked, summary: pd.DataFrame) -> list[Asked]:
-    """The same question of the other cavities, which should be full, and of a pattern's tip."""
-    own = filled_space(asked.measure)
-    others = [str(c) for c in summary if str(c).endswith(OF_BED) and filled_space(str(c)) != own]
-    found = [replace(asked, measure=c, better="larger", goal=Goal(c, FULL_SHARE)) for c in others]
-    if TIP in summary and not asked.measure.startswith("pattern_"):
-        found.append(replace(asked, measure=TIP, better="smaller", goal=None))
-    return found
+    """What is asked besides, and of the other cavities, to be full, and of a pattern's tip."""
+    aims = list(asked.beside)
+    told = {filled_space(measure) for measure in (asked.measure, *(a.measure for a in aims))}
+    shares = [str(column) for column in summary if str(column).endswith(OF_BED)]
+    aims += [Aim(measure=share) for share in shares if filled_space(share) not in told]
+    if TIP in summary and not any(measure.startswith("pattern_") for measure in told):
+        aims.append(Aim(measure=TIP, better="smaller"))
+    return [replace(asked, measure=a.measure, better=a.better, goal=a.goal) for a in aims]
 
 
 def _decide_one(asked: Asked, evidence: Evidence) -> Answer:

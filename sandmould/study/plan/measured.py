@@ -79,6 +79,8 @@ def problems_elsewhere(study: Study, results: Path) -> Iterator[Problem]:
 def _asked(study: Study) -> Iterator[tuple[str, str]]:
     """Key and name of every measure that a study names of its own runs."""
     yield "objective.measure", study.objective.measure
+    for i, aim in enumerate(study.objective.beside):
+        yield f"objective.beside.{i}.measure", aim.measure
     for name in study.equivalence.margins:
         yield "equivalence.margins", name
     others = tuple(f"{name}__" for name in study.calibration.also)

@@ -263,6 +263,23 @@ def test_a_target_that_nothing_can_reach_is_one_sentence(
 
 
 @pytest.mark.parametrize(
+    ("beside", "key", "valid"),
+    [
+        ([{"measure": "tube_fill_fraction"}], "measure", "each measure once"),
+        ([{"measure": "solid_fraction", "better": "neither"}], "better", "larger or smaller"),
+        ([{"measure": "solid_fraction", "target": 1.2}], "target", "above 0 and at most 1"),
+        ([{"measure": "solid_fractoin"}], "measure", "nearest"),
+    ],
+)
+def test_what_is_asked_besides_is_checked_as_the_first(
+    planned: Planned, beside: list[dict[str, Any]], key: str, valid: str
+) -> None:
+    said = told(planned, objective={"beside": beside}, scenario={"engine": {"name": "reference"}})
+    assert f"objective.beside.0.{key}" in said
+    assert valid in said
+
+
+@pytest.mark.parametrize(
     ("objective", "goal"),
     [
         ({}, Goal("tube_fill_of_bed_fraction", 0.95)),

@@ -7,7 +7,9 @@ import math
 import pandas as pd
 import pytest
 
-from sandmould.statistics.answer import Decided
+from sandmould.statistics.answer import Asked, Decided
+from sandmould.statistics.config import Aim
+from sandmould.statistics.decision import Evidence, decide
 from sandmould.statistics.over_time import first_reach_s
 from sandmould.statistics.refining import Refining, refining_of, resolution_among
 from tests import answered
@@ -161,3 +163,20 @@ def test_first_reach_is_interpolated() -> None:
     assert first_reach_s([0, 1, 2, 3], [0, 0.4, 0.8, 0.7], 0.6) == pytest.approx(1.5)
     assert first_reach_s([0, 1], [0.7, 0.8], 0.6) == 0
     assert math.isnan(first_reach_s([0, 1, 2], [0, 0.4, 0.5], 0.6))
+
+
+def test_what_is_asked_besides_trades_against_the_first() -> None:
+    """Fill is best at 60 Hz, density at 30 Hz: no setting does both, and a table shows it."""
+    dense = {30: (0.620, 0.622, 0.621), 45: (0.600, 0.603, 0.601), 60: (0.580, 0.581, 0.583)}
+    fills = {30: (0.20, 0.22, 0.21), 45: (0.30, 0.31, 0.33), 60: (0.50, 0.52, 0.51)}
+    summary = table(HZ, **{FILL: fills, "solid_fraction": dense})
+    aims = (Aim(measure="solid_fraction"),)
+    answer = decide(Asked(FILL, "larger", (HZ,), beside=aims), Evidence(summary))
+    (other,) = answer.beside
+    assert other.asked.measure == "solid_fraction"
+    assert other.best is not None
+    assert other.best.label == "30 Hz"
+    assert answer.trades
+    aims = (Aim(measure="solid_fraction", target=0.6),)
+    answer = decide(Asked(FILL, "larger", (HZ,), beside=aims), Evidence(summary))
+    assert answer.beside[0].decided is Decided.REACHED
