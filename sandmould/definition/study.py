@@ -76,7 +76,7 @@ class Study(Section):
     )
     replicates: int = quantity(
         1,
-        "Runs of every point, alike but for the grains' starting places.",
+        "Runs of every point; they differ only in where their grains start.",
         source=ARGUED,
         ge=1,
         le=REPLICATES.most,

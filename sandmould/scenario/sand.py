@@ -71,7 +71,7 @@ class Sand(Section):
     )
     disc_thickness_m: Annotated[float, Field(ge=1e-6, le=10)] | Literal["grain"] = quantity(
         "grain",
-        "Length of a disc across the plane, 2D only; grain is the mass-median diameter, which "
+        "Length of a disc across the plane, 2D only; grain is the median diameter by mass, which "
         "makes discs as hard under their load as spheres are.",
         unit="m",
         source=ARGUED,
