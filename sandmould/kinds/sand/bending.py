@@ -43,7 +43,7 @@ class BentPattern:
         held = self.pattern.space.node_m[self.pattern.fixed.any(axis=1)]
         if not len(held):
             held = self.pattern.space.node_m.mean(axis=0, keepdims=True)
-        self._free = np.logical_not(self.pattern.fixed[self.drawn.nodes].any(axis=1))
+        self._free = np.logical_not(self.drawn.held(self.pattern.fixed).any(axis=1))
         self.tip = farthest_corner(self.drawn.vertices_m, held)
         """Its vertex farthest from the supports, or from its middle where it has none."""
         around = surroundings_of(scenario, self.pattern)
