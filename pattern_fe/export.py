@@ -1,4 +1,4 @@
-"""The surface of a deformed pattern in files: fields for ParaView, and STL."""
+"""A deformed pattern in files: fields of its surface and solid for ParaView, and STL."""
 
 from __future__ import annotations
 
@@ -8,9 +8,11 @@ import meshio
 import numpy as np
 from numpy.typing import NDArray
 from skfem import MeshQuad
+from skfem.io.meshio import to_meshio
 
 from sandmould.pattern_fe.distance import distance_from_drawing
 from sandmould.pattern_fe.loads import vertex_pressure_pa
+from sandmould.pattern_fe.pattern import Pattern
 from sandmould.pattern_fe.perimeter import Perimeter
 from sandmould.pattern_fe.space import Space
 
@@ -46,6 +48,32 @@ def write_surface(
     meshio.Mesh(_in_space(moved.vertices_m), [(kind, perimeter.facets)], point_data=values).write(
         path, file_format="vtu"
     )
+
+
+def write_solid(path: Path, pattern: Pattern, displacement_m: Array, large: bool = False) -> None:
+    """Write the deformed solid with its stress for ParaView (.vtu), sides of elements straight.
+
+    Parameters
+    ----------
+    path : Path
+    pattern : Pattern
+    displacement_m : (n, d) float64, m
+        Of all nodes.
+    large : bool
+        Whether displacements are large.
+    """
+    mesh = pattern.space.mesh
+    corners_m = displacement_m[: mesh.nvertices]
+    written = to_meshio(
+        type(mesh)(mesh.p + corners_m.T, mesh.t),
+        {"displacement_m": _in_space(corners_m)},
+        {
+            "von_mises_pa": [pattern.von_mises_pa(displacement_m, large)],
+            "compression_pa": [pattern.compression_pa(displacement_m, large)],
+        },
+    )
+    written.points = _in_space(written.points)
+    written.write(path, file_format="vtu")
 
 
 def write_stl(path: Path, space: Space, perimeter: Perimeter, displacement_m: Array) -> None:

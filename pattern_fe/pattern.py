@@ -242,6 +242,12 @@ class Pattern:
         equivalent = von_mises_pa(self.foam, self.stress_pa(displacement_m, large))
         return np.asarray(np.average(equivalent, axis=1, weights=self.space.weight))
 
+    def compression_pa(self, displacement_m: Array, large: bool = False) -> Array:
+        """Greatest mean compression of each element, whatever its direction, (ne,) float64, Pa."""
+        weight = self.space.weight[..., None, None]
+        mean = (weight * self.stress_pa(displacement_m, large)).sum(axis=1) / weight.sum(axis=1)
+        return np.asarray(-np.linalg.eigvalsh(mean)[:, 0])
+
     def natural_frequencies_hz(self, count: int = 1) -> Array:
         """Lowest natural frequencies, ascending, (count,) float64; rigid motions are near 0."""
         mass = dynamics.as_diagonal(self.mass_kg, self.space.dimension)

@@ -73,6 +73,7 @@ class FoamBody:
         moment = cross(place_m, outer).sum(axis=0)
         return StaticSolution(
             self._motion @ moved,
+            moved,
             pattern.energy_j(moved, self._large),
             np.asarray(reaction.sum(axis=0)),
             float(np.linalg.norm(moment)),

@@ -70,10 +70,11 @@ class FreeBody:
         rigid_there = self._at(rigid)
         away = self._foam.displacement_m.ravel() - on_surface[:, 0]
         place, *_ = np.linalg.lstsq(rigid_there, away, rcond=None)
-        moved_m = (on_surface[:, 0] + rigid_there @ place).reshape(load_n.shape)
+        nodes_m = (shape + rigid @ place).reshape(whole.shape)
         moment = cross(pattern.space.node_m, whole).sum(axis=0)
         return StaticSolution(
-            moved_m,
+            self._surface.motion @ nodes_m,
+            nodes_m,
             0.5 * float(shape @ balanced),
             np.asarray(contact_n.sum(axis=0)),
             float(np.linalg.norm(moment)),

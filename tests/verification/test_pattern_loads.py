@@ -113,10 +113,8 @@ def test_forces_of_grains_anywhere_are_in_balance_with_the_supports(kind: str, o
 
 def ring(through: int, depth_m: float | None) -> Any:
     """Quarter of a ring or tube with straight sides, its flat sides named."""
-    lines = [
-        np.linspace(INNER_M, OUTER_M, through + 1),
-        np.linspace(0.0, np.pi / 2, 3 * through + 1),
-    ]
+    radii = np.linspace(INNER_M, OUTER_M, through + 1)
+    angles = np.linspace(0.0, np.pi / 2, 3 * through + 1)
     if depth_m is None:
         mesh = MeshQuad.init_tensor(radii, angles)
     else:
