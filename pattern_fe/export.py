@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from pathlib import Path
 
 import meshio
@@ -12,7 +13,6 @@ from skfem.io.meshio import to_meshio
 
 from sandmould.pattern_fe.distance import distance_from_drawing
 from sandmould.pattern_fe.loads import vertex_pressure_pa
-from sandmould.pattern_fe.pattern import Pattern
 from sandmould.pattern_fe.perimeter import Perimeter
 from sandmould.pattern_fe.space import Space
 
@@ -50,28 +50,24 @@ def write_surface(
     )
 
 
-def write_solid(path: Path, pattern: Pattern, displacement_m: Array, large: bool = False) -> None:
-    """Write the deformed solid with its stress for ParaView (.vtu), sides of elements straight.
+def write_solid(
+    path: Path, space: Space, displacement_m: Array, of_elements: Mapping[str, Array]
+) -> None:
+    """Write the deformed solid for ParaView (.vtu), sides of elements straight.
 
     Parameters
     ----------
     path : Path
-    pattern : Pattern
+    space : Space
     displacement_m : (n, d) float64, m
         Of all nodes.
-    large : bool
-        Whether displacements are large.
+    of_elements : mapping of name to (ne,) float64
     """
-    mesh = pattern.space.mesh
+    mesh = space.mesh
     corners_m = displacement_m[: mesh.nvertices]
-    written = to_meshio(
-        type(mesh)(mesh.p + corners_m.T, mesh.t),
-        {"displacement_m": _in_space(corners_m)},
-        {
-            "von_mises_pa": [pattern.von_mises_pa(displacement_m, large)],
-            "compression_pa": [pattern.compression_pa(displacement_m, large)],
-        },
-    )
+    fields = {name: [values] for name, values in of_elements.items()}
+    bent = type(mesh)(mesh.p + corners_m.T, mesh.t)
+    written = to_meshio(bent, {"displacement_m": _in_space(corners_m)}, fields)
     written.points = _in_space(written.points)
     written.write(path, file_format="vtu")
 

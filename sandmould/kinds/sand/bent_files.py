@@ -63,4 +63,8 @@ def write_solids(scenario: Scenario, moments: tuple[Moment, ...], out: Path) -> 
         rest = bent.at_rest(snapshot.pattern_load_n)
         moved_m = snapshot.pattern_m - bent.drawn.vertices_m
         nodes_m = bent.pattern.spread(moved_m) if rest is None else rest.nodes_m
-        write_solid(out / f"pattern_{stage}.vtu", bent.pattern, nodes_m, bent.is_large)
+        stress = {
+            "von_mises_pa": bent.pattern.von_mises_pa(nodes_m, bent.is_large),
+            "compression_pa": bent.pattern.compression_pa(nodes_m, bent.is_large),
+        }
+        write_solid(out / f"pattern_{stage}.vtu", bent.pattern.space, nodes_m, stress)
