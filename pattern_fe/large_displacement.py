@@ -105,7 +105,8 @@ class _Equilibrium:
             pressed = np.asarray(self.contact_n.any(axis=1))
             touched = touch(self.surroundings, at, led, response, pressed)
             self.contact_n = np.zeros_like(at) if touched is None else touched.load_n
-            step = solved((residual_n + motion.T @ self.contact_n).ravel())
+            if touched is not None:
+                step = solved((residual_n + motion.T @ self.contact_n).ravel())
         return step.reshape(displacement_m.shape)
 
     def residual_n(self, displacement_m: Array, load_n: Array) -> tuple[Array, float]:
