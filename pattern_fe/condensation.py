@@ -1,4 +1,4 @@
-"""A pattern seen from its surface: stiffness and mass on the vertices alone."""
+"""A pattern seen from its surface: stiffness of its nodes there, and mass of its vertices."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import NDArray
 from scipy.linalg import eigh
-from scipy.sparse import csc_array
+from scipy.sparse import csc_array, csr_array
 
 from sandmould.pattern_fe.factor import factorised
 from sandmould.pattern_fe.supports import Mask
@@ -20,56 +20,61 @@ _COLUMNS = 256
 
 @dataclass(frozen=True)
 class CondensedSurface:
-    """What is stepped beside an engine's grains: stiffness and mass at the vertices.
+    """What is stepped beside an engine's grains.
 
-    Components run vertex by vertex, x before y before z. Held ones have an infinite mass, so that
-    no force moves them; the stiffness keeps their rows, which give the supports' reactions.
+    Components run node by node or vertex by vertex, x before y before z. Vertices that are held
+    have an infinite mass, so that no force moves them; the stiffness keeps the rows of held nodes,
+    which give the supports' reactions.
     """
 
     stiffness_n_m: Array
-    """(n, n) float64, N/m, symmetric."""
+    """(n, n) float64, N/m, symmetric: of the nodes on the surface."""
+    fixed: NDArray[np.bool_]
+    """(n,) bool: components of these nodes that do not move."""
     mass_kg: Array
-    """(n,) float64, kg; infinite where held."""
+    """(nv,) float64, kg: of components of the vertices, infinite where held."""
+    motion: Array
+    """(nv, n) float64: shares of the nodes' displacements in those of the vertices."""
     loose: int = 0
     """Motions that nothing holds and that bend nothing."""
 
     @cached_property
     def modes(self) -> tuple[Array, Array]:
-        """Free oscillations of the masses.
+        """Free oscillations of the masses of the vertices.
 
         Returns
         -------
         square_1_s2 : (m,) float64, 1/s2
             Squares of the angular frequencies, ascending, of as many modes as free components; 0
             of loose motions.
-        shape : (n, m) float64, kg^-1/2
-            Columns of unit modal mass, 0 where held.
+        shape : (nv, m) float64, kg^-1/2
+            Motion of the vertices in columns of unit modal mass, 0 where held.
         """
-        free = np.isfinite(self.mass_kg)
-        square, part = eigh(self.stiffness_n_m[np.ix_(free, free)], np.diag(self.mass_kg[free]))
+        free, moves = ~self.fixed, np.isfinite(self.mass_kg)
+        motion = self.motion[:, free]
+        mass = motion[moves].T @ (self.mass_kg[moves, None] * motion[moves])
+        square, shape = eigh(self.stiffness_n_m[np.ix_(free, free)], mass)
         square[: self.loose] = 0.0
-        shape = np.zeros((len(free), len(square)))
-        shape[free] = part
-        return square, shape
+        return square, motion @ shape
 
 
 def condensed_surface(
     stiffness: csc_array,
     mass_kg: Array,
-    nodes: NDArray[np.int64],
+    motion: csr_array,
     fixed: Mask,
     loose: int = 0,
 ) -> CondensedSurface:
-    """Schur complement on some nodes, exact for static loads on them (Guyan 1965).
+    """Schur complement on the nodes of a surface, exact for static loads on it (Guyan 1965).
 
     Parameters
     ----------
     stiffness : (N d, N d) sparse float64, N/m
         Of all nodes.
-    mass_kg : (n,) float64, kg
-        Of the retained nodes.
-    nodes : (n,) int64
-        Retained.
+    mass_kg : (nv,) float64, kg
+        Of the vertices.
+    motion : (nv, N) sparse float64
+        See ``Perimeter``.
     fixed : (N, d) bool
     loose : int, optional
         Rigid motions that nothing holds.
@@ -77,9 +82,9 @@ def condensed_surface(
     Returns
     -------
     CondensedSurface
-        Of n d components; memory for (n d)^2 numbers is needed a few times over.
+        Memory for the square of its components is needed a few times over.
     """
-    d = fixed.shape[1]
+    d, nodes = fixed.shape[1], np.unique(motion.indices)
     retained = (nodes[:, None] * d + np.arange(d)).ravel()
     # what is held inside does not move
     inner = np.setdiff1d(np.flatnonzero(~fixed.ravel()), retained)
@@ -90,6 +95,7 @@ def condensed_surface(
         for first in range(0, len(retained), _COLUMNS):
             columns = slice(first, first + _COLUMNS)
             schur[:, columns] -= coupling.T @ factor.solve(coupling[:, columns].toarray())
+    moving = np.kron(motion[:, nodes].toarray(), np.eye(d))
     held = fixed.ravel()[retained]
-    mass = np.where(held, np.inf, np.repeat(mass_kg, d))
-    return CondensedSurface(0.5 * (schur + schur.T), mass, loose)
+    mass = np.where(moving[:, ~held].any(axis=1), np.repeat(mass_kg, d), np.inf)
+    return CondensedSurface(0.5 * (schur + schur.T), held, mass, moving, loose)

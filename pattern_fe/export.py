@@ -1,16 +1,19 @@
-"""The surface of a deformed pattern in files: fields for ParaView, and STL."""
+"""A deformed pattern in files: fields of its surface and solid for ParaView, and STL."""
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from pathlib import Path
 
 import meshio
 import numpy as np
 from numpy.typing import NDArray
+from skfem import MeshQuad
+from skfem.io.meshio import to_meshio
 
 from sandmould.pattern_fe.distance import distance_from_drawing
 from sandmould.pattern_fe.loads import vertex_pressure_pa
-from sandmould.pattern_fe.perimeter import Perimeter, split_face
+from sandmould.pattern_fe.perimeter import Perimeter
 from sandmould.pattern_fe.space import Space
 
 Array = NDArray[np.float64]
@@ -47,6 +50,28 @@ def write_surface(
     )
 
 
+def write_solid(
+    path: Path, space: Space, displacement_m: Array, of_elements: Mapping[str, Array]
+) -> None:
+    """Write the deformed solid for ParaView (.vtu), sides of elements straight.
+
+    Parameters
+    ----------
+    path : Path
+    space : Space
+    displacement_m : (n, d) float64, m
+        Of all nodes.
+    of_elements : mapping of name to (ne,) float64
+    """
+    mesh = space.mesh
+    corners_m = displacement_m[: mesh.nvertices]
+    fields = {name: [values] for name, values in of_elements.items()}
+    bent = type(mesh)(mesh.p + corners_m.T, mesh.t)
+    written = to_meshio(bent, {"displacement_m": _in_space(corners_m)}, fields)
+    written.points = _in_space(written.points)
+    written.write(path, file_format="vtu")
+
+
 def write_stl(path: Path, space: Space, perimeter: Perimeter, displacement_m: Array) -> None:
     """Write the deformed surface as STL; a 2D pattern becomes a plate of its thickness.
 
@@ -59,32 +84,27 @@ def write_stl(path: Path, space: Space, perimeter: Perimeter, displacement_m: Ar
     displacement_m : (n, d) float64, m
         Of all nodes of the pattern.
     """
-    place_m = space.node_m + displacement_m
+    moved = perimeter.moved(perimeter.motion @ displacement_m)
     if space.dimension == 3:
-        points, triangles = place_m, perimeter.nodes[perimeter.facets]
+        points, triangles = moved.vertices_m, moved.facets
     else:
-        points, triangles = _plate(space, perimeter, place_m)
+        points, triangles = _plate(space, moved, space.node_m + displacement_m)
     meshio.Mesh(points, [("triangle", triangles)]).write(path, file_format="stl", binary=True)
 
 
-def _plate(space: Space, perimeter: Perimeter, place_m: Array) -> tuple[Array, Indices]:
+def _plate(space: Space, moved: Perimeter, place_m: Array) -> tuple[Array, Indices]:
     """Two copies of a flat pattern and a wall between them; normals point outwards."""
     n = len(place_m)
+    outline = np.asarray(moved.motion.argmax(axis=1))
+    place_m[outline] = moved.vertices_m
     half_m = 0.5 * space.thickness_m
     points = np.vstack([np.column_stack([place_m, np.full(n, z)]) for z in (-half_m, half_m)])
-    domain = space.mesh.refdom
-    corners = list(range(domain.nnodes))
-    if space.order == 1:
-        parts: list[tuple[int, ...]] = [(0, i, i + 1) for i in corners[1:-1]]
-    else:
-        sides = [sorted(face) for face in domain.facets]
-        edges = [len(corners) + sides.index(sorted((i, (i + 1) % len(corners)))) for i in corners]
-        parts = split_face(corners, edges, 8 if len(corners) == 4 else None)
-    flat = space.cells[:, np.array(parts)].reshape(-1, 3)
+    mesh = space.node_mesh
+    flat = (mesh.to_meshtri() if isinstance(mesh, MeshQuad) else mesh).t.T
     edge, next_edge = (space.node_m[flat[:, i]] - space.node_m[flat[:, 0]] for i in (1, 2))
     turned = edge[:, 0] * next_edge[:, 1] - edge[:, 1] * next_edge[:, 0] < 0.0
     flat = np.where(turned[:, None], flat[:, ::-1], flat)
-    a, b = perimeter.nodes[perimeter.facets].T
+    a, b = outline[moved.facets].T
     wall = np.concatenate([np.stack([a, b, b + n], axis=1), np.stack([a, b + n, a + n], axis=1)])
     return points, np.concatenate([flat[:, ::-1], flat + n, wall])
 

@@ -6,6 +6,7 @@ from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.sparse import csc_array, csr_array, kron
 
 from sandmould.pattern_fe.contact import touch
 from sandmould.pattern_fe.elasticity import (
@@ -56,38 +57,34 @@ class NewtonSettings:
             raise ValueError(f"number of load steps is {self.load_steps}, valid is 1 or more")
 
 
-@dataclass(frozen=True)
-class Obstructed:
-    """What stands in a pattern's way."""
-
-    surroundings: Surroundings
-    nodes: NDArray[np.int64]
-    """(nv,) int64: node at each vertex of the surface that they surround."""
-
-
 class _Equilibrium:
     """One pattern under growing dead loads."""
 
     def __init__(
-        self, space: Space, foam: Foam, bedding: Array, fixed: Mask, obstructed: Obstructed | None
+        self,
+        space: Space,
+        foam: Foam,
+        bedding: csc_array,
+        fixed: Mask,
+        motion: csr_array,
+        surroundings: Surroundings | None,
     ) -> None:
         self.space = space
         self.foam = foam
         self.bedding = bedding
         self.free = np.flatnonzero(~fixed.ravel())
-        self.obstructed = obstructed
-        self.contact_n = np.zeros_like(space.node_m)
-        """(n, d) float64, N: loads of what stands in the way, in the last iteration."""
+        self.motion, self.surroundings = motion, surroundings
+        self.contact_n = np.zeros((motion.shape[0], fixed.shape[1]))
+        """(nv, d) float64, N: loads of what stands in the way, in the last iteration."""
 
     def force_n(self, displacement_m: Array) -> Array:
-        spring = self.bedding[:, None] * displacement_m
+        spring = (self.bedding @ displacement_m.ravel()).reshape(displacement_m.shape)
         return internal_force_n(self.space, self.foam, displacement_m) + spring
 
     def newton_step_m(self, displacement_m: Array, residual_n: Array) -> Array:
         """Step under a residual without reactions of contact, which it finds too."""
         matrices = element_tangent_n_m(self.space, self.foam, displacement_m)
-        tangent = self.space.assembled(matrices)
-        tangent.setdiag(tangent.diagonal() + np.repeat(self.bedding, self.space.dimension))
+        tangent = self.space.assembled(matrices) + self.bedding
         factor = factorised(tangent[self.free][:, self.free])
 
         def solved(load_n: Array) -> Array:
@@ -96,23 +93,20 @@ class _Equilibrium:
             return step
 
         step = solved(residual_n.ravel())
-        if self.obstructed is not None:
-            nodes, shape = self.obstructed.nodes, displacement_m.shape
-            entries = (nodes[:, None] * shape[1] + np.arange(shape[1])).ravel()
+        if self.surroundings is not None:
+            motion, shape = self.motion, displacement_m.shape
+            of_components = csr_array(kron(motion, np.eye(shape[1])))
 
             def response(load_n: Array) -> Array:
-                whole = np.zeros((displacement_m.size, load_n.shape[1]))
-                whole[entries] = load_n
-                return solved(whole)[entries]
+                return np.asarray(of_components @ solved(of_components.T @ load_n))
 
-            at = displacement_m[nodes]
-            led = at + step.reshape(shape)[nodes]
-            pressed = np.asarray(self.contact_n[nodes].any(axis=1))
-            touched = touch(self.obstructed.surroundings, at, led, response, pressed)
-            self.contact_n = np.zeros_like(displacement_m)
+            at = motion @ displacement_m
+            led = at + motion @ step.reshape(shape)
+            pressed = np.asarray(self.contact_n.any(axis=1))
+            touched = touch(self.surroundings, at, led, response, pressed)
+            self.contact_n = np.zeros_like(at) if touched is None else touched.load_n
             if touched is not None:
-                self.contact_n[nodes] = touched.load_n
-                step = solved((residual_n + self.contact_n).ravel())
+                step = solved((residual_n + motion.T @ self.contact_n).ravel())
         return step.reshape(displacement_m.shape)
 
     def residual_n(self, displacement_m: Array, load_n: Array) -> tuple[Array, float]:
@@ -125,9 +119,9 @@ class _Equilibrium:
 
     def is_open(self, displacement_m: Array) -> bool:
         """Whether the surface is outside what surrounds it, to a millionth of its extent."""
-        if self.obstructed is None:
+        if self.surroundings is None:
             return True
-        around, moved_m = self.obstructed.surroundings, displacement_m[self.obstructed.nodes]
+        around, moved_m = self.surroundings, self.motion @ displacement_m
         if around.is_clear(moved_m):
             return True
         return around.deepest_m(moved_m) <= _OVERLAP * around.extent_m
@@ -153,7 +147,7 @@ class _Equilibrium:
     def _pressed(self, residual_n: Array) -> Array:
         """Reactions of contact at free components."""
         pressed = np.zeros(residual_n.size)
-        pressed[self.free] = self.contact_n.ravel()[self.free]
+        pressed[self.free] = (self.motion.T @ self.contact_n).ravel()[self.free]
         return pressed.reshape(residual_n.shape)
 
     def _searched(self, displacement_m: Array, step_m: Array) -> Array | None:
@@ -175,11 +169,12 @@ class _Equilibrium:
 def solve_large(
     space: Space,
     foam: Foam,
-    bedding: Array,
+    bedding: csc_array,
     fixed: Mask,
     load_n: Array,
     settings: NewtonSettings,
-    obstructed: Obstructed | None = None,
+    motion: csr_array,
+    surroundings: Surroundings | None = None,
 ) -> tuple[Array, Array]:
     """Displacements under dead loads in the total Lagrangian form, and reactions of contact.
 
@@ -187,24 +182,28 @@ def solve_large(
     ----------
     space : Space
     foam : Foam
-    bedding : (n,) float64, N/m
-        Springs at the nodes.
+    bedding : (n d, n d) sparse float64, N/m
+        Springs.
     fixed : (n, d) bool
     load_n : (n, d) float64, N
     settings : NewtonSettings
-    obstructed : Obstructed, optional
+    motion : (nv, n) sparse float64
+        Of the surface that the sand meets; see ``Perimeter``.
+    surroundings : Surroundings, optional
         What stands in the way; its gaps are linearised anew in every iteration.
 
     Returns
     -------
-    displacement_m, contact_n : (n, d) float64, m and N
+    displacement_m : (n, d) float64, m
+    contact_n : (nv, d) float64, N
+        On the vertices.
 
     Raises
     ------
     LoadNotReachedError
         When the iteration fails in the smallest load step.
     """
-    equilibrium = _Equilibrium(space, foam, bedding, fixed, obstructed)
+    equilibrium = _Equilibrium(space, foam, bedding, fixed, motion, surroundings)
     displacement, reached, step = np.zeros_like(space.node_m), 0.0, 1.0 / settings.load_steps
     while reached < 1.0:
         target = min(1.0, reached + step)

@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.sparse import csc_array
+from scipy.sparse import csc_array, diags_array, kron
 from scipy.sparse.linalg import SuperLU
 
 from sandmould.geometry.geometry import Scene
@@ -22,7 +22,7 @@ from sandmould.pattern_fe.elasticity import (
     von_mises_pa,
 )
 from sandmould.pattern_fe.factor import factorised
-from sandmould.pattern_fe.large_displacement import NewtonSettings, Obstructed, solve_large
+from sandmould.pattern_fe.large_displacement import NewtonSettings, solve_large
 from sandmould.pattern_fe.material import Foam
 from sandmould.pattern_fe.motion import CentralDifferences
 from sandmould.pattern_fe.perimeter import perimeter_of
@@ -39,7 +39,8 @@ class Pattern:
     """Mesh, foam and supports of one pattern.
 
     Displacements and loads are arrays of one row a node, ``(n, d)``, or of one row a vertex of
-    the surface, ``(nv, d)``: ``on_nodes`` and ``on_surface`` lead from one to the other.
+    the surface, ``(nv, d)``. ``on_nodes`` for loads and ``on_surface`` for displacements lead from
+    one to the other; each is the transpose of the other, see ``perimeter``.
 
     Parameters
     ----------
@@ -76,15 +77,17 @@ class Pattern:
         """As drawn."""
 
     @cached_property
-    def _bedding_n_m(self) -> Array:
-        """Springs of the bedding at all nodes, (n,) float64, N/m."""
-        return self.supports.bedding_n_m3 * self.on_nodes(self.surface.vertex_area_m2)
+    def _bedding_n_m(self) -> csc_array:
+        """Springs of the bedding at the vertices, (n d, n d) sparse float64, N/m."""
+        motion, area = self.surface.motion, diags_array(self.surface.vertex_area_m2)
+        of_nodes = self.supports.bedding_n_m3 * (motion.T @ area @ motion)
+        return csc_array(kron(of_nodes, np.eye(self.space.dimension)))
 
     @cached_property
     def stiffness(self) -> csc_array:
         """Of small displacements, bedding included, (n d, n d) sparse float64, N/m."""
         matrix = self.space.assembled(element_stiffness_n_m(self.space, self.foam))
-        return matrix + dynamics.as_diagonal(self._bedding_n_m, self.space.dimension)
+        return matrix + self._bedding_n_m
 
     @cached_property
     def mass_kg(self) -> Array:
@@ -116,14 +119,12 @@ class Pattern:
         return self._loose_motions > 0
 
     def on_nodes(self, values: Array) -> Array:
-        """Values of vertices as those of all nodes, 0 inside."""
-        whole = np.zeros((len(self.space.node_m), *values.shape[1:]))
-        whole[self.surface.nodes] = values
-        return whole
+        """Loads on vertices as those on all nodes, 0 inside."""
+        return np.asarray(self.surface.motion.T @ values)
 
     def on_surface(self, values: Array) -> Array:
-        """Values of all nodes as those of the vertices of the surface."""
-        return np.asarray(values[self.surface.nodes])
+        """Displacements of all nodes as those of the vertices of the surface."""
+        return np.asarray(self.surface.motion @ values)
 
     def solve_linear(self, load_n: Array) -> Array:
         """Small displacements under loads; the first call factorises, the others reuse it.
@@ -149,14 +150,21 @@ class Pattern:
     def solve_large(
         self,
         load_n: Array,
-        obstructed: Obstructed | None = None,
+        surroundings: Surroundings | None = None,
         settings: NewtonSettings = _NEWTON,
     ) -> tuple[Array, Array]:
         """Large displacements under dead loads, and reactions of obstacles; see ``solve_large``."""
         self._check_load(load_n)
         check_held(self.space.node_m, self.fixed, self.supports)
         return solve_large(
-            self.space, self.foam, self._bedding_n_m, self.fixed, load_n, settings, obstructed
+            self.space,
+            self.foam,
+            self._bedding_n_m,
+            self.fixed,
+            load_n,
+            settings,
+            self.surface.outer.motion,
+            surroundings,
         )
 
     def spread(self, outer_m: Array) -> Array:
@@ -173,8 +181,9 @@ class Pattern:
         """
         d = self.space.dimension
         whole = np.zeros_like(self.space.node_m)
-        nodes = self.surface.outer.nodes
-        whole[nodes] = outer_m
+        outer = self.surface.outer
+        nodes, there = outer.nodes, outer.motion[:, outer.nodes]
+        whole[nodes] = factorised(csc_array(there.T @ there)).solve(there.T @ outer_m)
         inner = np.setdiff1d(self._free, (d * nodes[:, None] + np.arange(d)).ravel())
         if len(inner):
             pull_n = -(self.stiffness @ whole.ravel())[inner]
@@ -183,8 +192,8 @@ class Pattern:
 
     def surrounded(self, scene: Scene, own_name: str = "", reach_m: float = np.inf) -> Surroundings:
         """What the pattern can touch of a scene; see ``Surroundings``."""
-        held = self.fixed[self.surface.nodes[self.surface.outer_line]]
-        return Surroundings(scene, self.surface.outer, held, own_name, reach_m)
+        outer = self.surface.outer
+        return Surroundings(scene, outer, outer.held(self.fixed), own_name, reach_m)
 
     def _check_load(self, load_n: Array) -> None:
         valid = self.space.node_m.shape
@@ -221,17 +230,23 @@ class Pattern:
         slope = displacement_gradient(self.space, displacement_m)
         strain = green_strain(slope) if large else small_strain(slope)
         density = np.sum(strain * self.foam.stress_pa(strain), axis=(-2, -1))
-        bedding = np.sum(self._bedding_n_m[:, None] * displacement_m**2)
+        bedding = -np.vdot(self.bedding_force_n(displacement_m), displacement_m)
         return float(0.5 * (np.sum(density * self.space.weight) + bedding))
 
     def bedding_force_n(self, displacement_m: Array) -> Array:
         """Force of the bedding on the nodes, (n, d) float64, N."""
-        return -self._bedding_n_m[:, None] * displacement_m
+        return -(self._bedding_n_m @ displacement_m.ravel()).reshape(displacement_m.shape)
 
     def von_mises_pa(self, displacement_m: Array, large: bool = False) -> Array:
         """Mean equivalent stress of each element, (ne,) float64, Pa; arguments as ``stress_pa``."""
         equivalent = von_mises_pa(self.foam, self.stress_pa(displacement_m, large))
         return np.asarray(np.average(equivalent, axis=1, weights=self.space.weight))
+
+    def compression_pa(self, displacement_m: Array, large: bool = False) -> Array:
+        """Greatest mean compression of each element, whatever its direction, (ne,) float64, Pa."""
+        weight = self.space.weight[..., None, None]
+        mean = (weight * self.stress_pa(displacement_m, large)).sum(axis=1) / weight.sum(axis=1)
+        return np.asarray(-np.linalg.eigvalsh(mean)[:, 0])
 
     def natural_frequencies_hz(self, count: int = 1) -> Array:
         """Lowest natural frequencies, ascending, (count,) float64; rigid motions are near 0."""
@@ -250,13 +265,14 @@ class Pattern:
         area = self.surface.vertex_area_m2
         mass = self.mass_kg.sum() * area / area.sum()
         return condensed_surface(
-            self.stiffness, mass, self.surface.nodes, self.fixed, self._loose_motions
+            self.stiffness, mass, self.surface.motion, self.fixed, self._loose_motions
         )
 
     def critical_step_s(self) -> float:
         """Largest stable step of ``central_differences``, of the stiffest element and bedding."""
         elements2 = (2.0 / dynamics.critical_step_s(self.space, self.foam)) ** 2
-        bedding2 = float((self._bedding_n_m / self.mass_kg).max())
+        springs = abs(self._bedding_n_m).sum(axis=1).reshape(self.fixed.shape)
+        bedding2 = float((springs / self.mass_kg[:, None]).max())
         return 2.0 * math.sqrt(1.0 / (elements2 + bedding2))
 
     def central_differences(

@@ -1,27 +1,30 @@
 """The outer surface of a pattern, as an engine takes it: vertices and flat facets.
 
-Every node on the boundary is a vertex, those inside edges and faces too, so an edge of second
-order becomes two segments. A contact force shared among the corners of a facet by linear shape
-functions is then a set of nodal forces of the pattern as it stands: loads are conservative, force
-and moment exact; displacements are consistent, the motion of the surface under the grain is that of
-the nodes; and no mapping lies in between.
-Corners alone would be half as many but would not see the pattern bend inside an element. What
-differs from the integrals of the quadratic shape functions are local shares: an even pressure on
-an edge loads its nodes 1:2:1, not 1:4:1, with the same force and moment.
+Every node on the boundary has a vertex, so an edge of second order becomes two segments; a
+quadrilateral of first order has one more in its middle. One matrix leads from nodes to vertices: by
+it vertices move, and by its transpose their forces, which grains share among the corners of a facet
+by linear shape functions, become those of nodes. So the work of the sand is what the pattern
+receives, and force and moment are exact.
+It is the matrix by which facets move in the mean as the face does. A parabola fills 2/3 of its
+height and a line with a kink 1/2, so a vertex between corners goes 4/3 as far from their mean as
+its node. An even pressure then loads nodes by the integrals of their shape functions, those of an
+edge 1:4:1, on flat and on twisted faces.
 """
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.sparse import coo_array, csr_array
 
 from sandmould.pattern_fe.space import Space
 
 Array = NDArray[np.float64]
 Indices = NDArray[np.int64]
+_BULGE = 4.0 / 3.0
+"""How far a vertex goes from the mean of the corners beside it, over how far its node goes."""
 
 
 @dataclass(frozen=True)
@@ -33,12 +36,17 @@ class Perimeter:
     facets: Indices
     """(nf, d) int64: vertices of each; in 2D the solid lies left of them, in 3D they run
     counter-clockwise seen from outside."""
-    nodes: Indices
-    """(nv,) int64: node of the pattern at each vertex."""
+    motion: csr_array
+    """(nv, n) sparse float64: shares of the nodes' displacements in those of the vertices."""
     loops: tuple[slice, ...]
     """In 2D the vertices of each closed line in the order of its segments; empty in 3D."""
     thickness_m: float
     """Out of the plane in 2D, 1 in 3D."""
+
+    @property
+    def nodes(self) -> Indices:
+        """Nodes of the pattern on it, ascending, (k,) int64."""
+        return np.unique(self.motion.indices).astype(np.int64)
 
     @property
     def facet_area_vector_m2(self) -> Array:
@@ -80,7 +88,7 @@ class Perimeter:
             self,
             vertices_m=self.vertices_m[line],
             facets=of_line - line.start,
-            nodes=self.nodes[line],
+            motion=self.motion[line],
             loops=(whole,),
         )
 
@@ -94,6 +102,10 @@ class Perimeter:
         """Surface whose vertices are displaced, (nv, d) float64, m."""
         return replace(self, vertices_m=self.vertices_m + displacement_m)
 
+    def held(self, fixed: NDArray[np.bool_]) -> NDArray[np.bool_]:
+        """Components of vertices that do not move, (nv, d) bool, for those of nodes, (n, d)."""
+        return np.asarray(abs(self.motion) @ (~fixed).astype(np.float64) == 0.0)
+
 
 def perimeter_of(space: Space) -> Perimeter:
     """Find the outer surface of a pattern.
@@ -103,73 +115,69 @@ def perimeter_of(space: Space) -> Perimeter:
     ValueError
         When it is not closed, or touches itself in a point or along a line.
     """
-    mesh = space.mesh
+    motion = _motion(space)
+    place_m = motion @ space.node_m
+    mesh = space.node_mesh
     faces = mesh.boundary_facets()
-    cell = mesh.f2t[0, faces]
-    local = (mesh.t2f[:, cell] == faces).argmax(axis=0)
-    table = [face_parts(space, number) for number in range(mesh.refdom.nfacets)]
-    parts = np.array(
-        [[space.cells[c, p] for p in table[k]] for c, k in zip(cell, local, strict=True)]
-    )
-    centre = space.node_m[space.cells[cell, : mesh.refdom.nnodes]].mean(axis=1)
-    facets = parts.reshape(-1, parts.shape[2])
-    facets = _outward(space.node_m, facets, np.repeat(centre, parts.shape[1], axis=0))
+    behind_m = mesh.p[:, mesh.t[:, mesh.f2t[0, faces]]].mean(axis=1).T
+    facets = mesh.facets[:, faces].T
+    if facets.shape[1] == 4:
+        middle = len(space.node_m) + faces if space.order == 1 else None
+        facets, parts = _split(facets, middle)
+        behind_m = np.repeat(behind_m, parts, axis=0)
+    facets = _outward(place_m, facets, behind_m)
     if space.dimension == 2:
-        order, loops = _closed_lines(space.node_m, facets)
+        order, loops = _closed_lines(place_m, facets)
     else:
         _check_closed(facets)
         order, loops = np.unique(facets), ()
-    number = np.full(len(space.node_m), -1)
+    number = np.full(len(place_m), -1)
     number[order] = np.arange(len(order))
     facets = number[facets]
     if loops:
         facets = facets[facets[:, 0].argsort()]
-    return Perimeter(space.node_m[order], facets, order, loops, space.thickness_m)
+    return Perimeter(place_m[order], facets, motion[order], loops, space.thickness_m)
 
 
-def face_parts(space: Space, face: int) -> list[tuple[int, ...]]:
-    """Flat parts of a face of an element, as columns of ``space.cells``."""
-    domain = space.mesh.refdom
-    corners = domain.facets[face]
-    if space.order == 1:
-        return _halves(corners) if len(corners) == 4 else [tuple(corners)]
-    if space.dimension == 2:
-        middle = domain.nnodes + face
-        return [(corners[0], middle), (middle, corners[1])]
-    edges = [domain.nnodes + _edge(domain.edges, corners, i) for i in range(len(corners))]
-    centre = domain.nnodes + domain.nedges + face if len(corners) == 4 else None
-    return split_face(corners, edges, centre)
+def _motion(space: Space) -> csr_array:
+    """Shares of nodes in the motion of places between which facets may lie, (places, n) float64.
+
+    Nodes come first, in their order; in hexahedra of first order middles of all faces follow.
+    """
+    mesh, n, corners = space.mesh, len(space.node_m), space.mesh.nvertices
+    between = [] if space.order == 1 else [mesh.edges.T if mesh.dim() == 3 else mesh.facets.T]
+    if len(mesh.facets) == 4:
+        between.append(mesh.facets.T)
+    parts = [(np.arange(corners), np.arange(corners), np.ones(corners))]
+    first = corners
+    for ends in between:
+        row, own = first + np.arange(len(ends)), _BULGE if first < n else 0.0
+        parts.append((row, np.minimum(row, n - 1), np.full(len(ends), own)))
+        share = np.full(ends.size, (1.0 - own) / ends.shape[1])
+        parts.append((np.repeat(row, ends.shape[1]), ends.ravel(), share))
+        first += len(ends)
+    row, column, value = (np.concatenate(part) for part in zip(*parts, strict=True))
+    return csr_array(coo_array((value, (row, column)), shape=(first, n)))
 
 
-def _halves(corners: Sequence[int]) -> list[tuple[int, ...]]:
-    a, b, c, d = corners
-    return [(a, b, c), (a, c, d)]
-
-
-def _edge(edges: Sequence[Sequence[int]], corners: Sequence[int], i: int) -> int:
-    ends = sorted((corners[i], corners[(i + 1) % len(corners)]))
-    return [sorted(edge) for edge in edges].index(ends)
-
-
-def split_face(
-    corners: Sequence[int], edges: Sequence[int], centre: int | None
-) -> list[tuple[int, ...]]:
-    """Triangles between all nodes of a face of second order, turning as its corners do.
+def _split(faces: Indices, middle: Indices | None) -> tuple[Indices, int]:
+    """Triangles of quadrilaterals and their number in each.
 
     Parameters
     ----------
-    corners, edges : sequence of int
-        Nodes at the corners in order, and between each and the next.
-    centre : int or None
-        Node in the middle of a quadrilateral; a triangle has none.
+    faces : (nf, 4) int64
+        Corners in turn; in a mesh twice as fine one is a corner of the first, with the least
+        number, and the one across from it the middle of a face.
+    middle : (nf,) int64 or None
+        Vertex in the middle of each, if it has one.
     """
-    parts: list[tuple[int, ...]] = []
-    for i, corner in enumerate(corners):
-        if centre is None:
-            parts.append((corner, edges[i], edges[i - 1]))
-        else:
-            parts += [(corner, edges[i], centre), (corner, centre, edges[i - 1])]
-    return parts if centre is not None else [*parts, tuple(edges)]
+    if middle is not None:
+        ends = np.stack([faces, np.roll(faces, -1, axis=1)], axis=2)
+        around = np.broadcast_to(middle[:, None, None], (len(faces), 4, 1))
+        return np.concatenate([ends, around], axis=2).reshape(-1, 3), 4
+    turns = (faces.argmin(axis=1)[:, None] + np.arange(4)) % 4
+    turned = np.take_along_axis(faces, turns, axis=1)
+    return turned[:, [[0, 1, 2], [0, 2, 3]]].reshape(-1, 3), 2
 
 
 def _outward(node_m: Array, facets: Indices, inside_m: Array) -> Indices:

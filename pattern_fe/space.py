@@ -64,6 +64,12 @@ class Space:
         """Degree of products of gradients of shape functions, which are integrated exactly."""
         return _slope_degree(self.mesh, self.order)
 
+    @property
+    def node_mesh(self) -> Any:
+        """Mesh whose corners are the nodes in their order, in second order one twice as fine."""
+        bare = type(self.mesh)(self.mesh.p, self.mesh.t)
+        return bare if self.order == 1 else bare.refined()
+
     def basis(self, integrated_degree: int) -> Any:
         """Scalar basis of scikit-fem whose degrees of freedom are the nodes."""
         element = _ELEMENTS[type(self.mesh)][self.order - 1]()

@@ -214,10 +214,6 @@ class Surroundings:
         way_m = np.linalg.norm(moved_m - since.moved_m, axis=1)
         return bool((way_m < since.vertices_m).all() and way_m.max() < since.points_m)
 
-    def way_to_walls_m(self, moved_m: Array) -> Array:
-        """Way of each vertex back to the floor and walls that it is beyond, (nv, d) float64, m."""
-        return np.asarray(np.maximum(0.0, -self.wall_gaps_m(moved_m)) @ self._wall_normal)
-
     def deepest_m(self, moved_m: Array) -> float:
         """How far a vertex is inside a wall or obstacle at most, or a corner in the pattern, m."""
         gaps = self.gaps(moved_m, 0.0)

@@ -17,6 +17,8 @@ class StaticSolution:
 
     displacement_m: Array
     """(nv, d) float64, m, of the vertices of its surface."""
+    nodes_m: Array
+    """(n, d) float64, m: displacement of all its nodes."""
     energy_j: float
     """Elastic energy stored in it."""
     reaction_n: Array

@@ -7,6 +7,7 @@ from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.sparse import csr_array, diags_array, kron
 
 from sandmould.pattern_fe.contact import touch
 from sandmould.pattern_fe.pattern import Pattern
@@ -89,12 +90,13 @@ class ExplicitFoam:
         ValueError
             When the masses are too small for the contacts: no step of the pattern's own helps.
         """
-        line = pattern.surface.outer_line
-        self._nodes = pattern.surface.nodes[line]
-        self.vertices_m = pattern.surface.vertices_m[line]
+        outer = pattern.surface.outer
+        self._surface = outer.motion
+        self.vertices_m = outer.vertices_m
         """Of the outer line as drawn, (nv, d) float64, m."""
-        free = ~pattern.fixed[self._nodes].all(axis=1)
-        pressed = contact.mass_kg(step_s) / float(pattern.mass_kg[self._nodes][free].min())
+        # 1/kg: how far an impulse on a vertex moves it
+        mobile = (outer.motion**2) @ (~pattern.fixed / pattern.mass_kg[:, None])
+        pressed = contact.mass_kg(step_s) * float(mobile.max())
         inner = (step_s / pattern.critical_step_s()) ** 2
         least = pressed / STABLE_SHARE
         if mass_scale is None:
@@ -121,12 +123,14 @@ class ExplicitFoam:
         """(nv, d) float64, N: of what it touches, in the last step."""
         self._surroundings = surroundings
         self._clearance = None if surroundings is None else surroundings.as_drawn
-        self._mobility_m_n = self._motion.mobility_m_n[self._nodes]
+        of_components = csr_array(kron(outer.motion, np.eye(self.vertices_m.shape[1])))
+        mobility = diags_array(self._motion.mobility_m_n.ravel())
+        self._mobility_m_n = csr_array(of_components @ mobility @ of_components.T)
 
     @property
     def displacement_m(self) -> Array:
         """Of the vertices of the outer line, (nv, d) float64, m."""
-        return np.asarray(self._motion.displacement_m[self._nodes])
+        return np.asarray(self._surface @ self._motion.displacement_m)
 
     def advance(self, load_n: Array) -> None:
         """Go on by one step of the grains.
@@ -137,8 +141,7 @@ class ExplicitFoam:
             On the outer line, at the start of the step.
         """
         motion = self._motion
-        load = np.zeros_like(motion.displacement_m)
-        load[self._nodes] = load_n
+        load = self._surface.T @ load_n
         for _ in range(self.sub_steps):
             self._before, velocity = motion.displacement_m, motion.velocity_m_s
             motion.advance(load)
@@ -147,7 +150,7 @@ class ExplicitFoam:
             self.work_j += motion.step_s * float(np.vdot(load, mean))
             lost = self._damping_1_s * float(np.vdot(self._mass_kg * mean, mean))
             self.damped_j += motion.step_s * lost
-            self.contact_j -= motion.step_s * float(np.vdot(touched, mean[self._nodes]))
+            self.contact_j -= motion.step_s * float(np.vdot(touched, self._surface @ mean))
 
     def _kept_out(self) -> Array:
         """Take the step anew with the forces of what the pattern would enter, and give them.
@@ -157,26 +160,17 @@ class ExplicitFoam:
         for Numerical Methods in Engineering 32, 1991): a vertex stops without rebound, and no
         stiffness of contact bounds the step.
         """
-        around, motion, nodes = self._surroundings, self._motion, self._nodes
+        around, free_m = self._surroundings, self.displacement_m
         self.contact_n = np.zeros_like(self.vertices_m)
-        if around is None:
+        if around is None or around.is_clear(free_m, self._clearance):
             return self.contact_n
-        free_m = motion.displacement_m[nodes]
-        if around.is_clear_of_solids(free_m, self._clearance):
-            # Lumped masses: floor and walls stop each vertex by itself.
-            back_m = around.way_to_walls_m(free_m)
-            beyond = back_m != 0.0
-            self.contact_n[beyond] = back_m[beyond] / self._mobility_m_n[beyond]
-        else:
-            self._clearance = around.clearance(self._before[nodes])
-            mobility = self._mobility_m_n.reshape(-1, 1)
-            found = touch(around, self._before[nodes], free_m, lambda load_n: mobility * load_n)
-            if found is not None:
-                self.contact_n = found.load_n
-        if self.contact_n.any():
-            whole = np.zeros_like(motion.displacement_m)
-            whole[nodes] = self.contact_n
-            motion.push(whole)
+        before_m = self._surface @ self._before
+        if not around.is_clear_of_solids(free_m, self._clearance):
+            self._clearance = around.clearance(before_m)
+        found = touch(around, before_m, free_m, lambda load_n: self._mobility_m_n @ load_n)
+        if found is not None:
+            self.contact_n = found.load_n
+            self._motion.push(self._surface.T @ self.contact_n)
         return self.contact_n
 
     @property

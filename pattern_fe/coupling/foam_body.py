@@ -8,7 +8,6 @@ from numpy.typing import NDArray
 from sandmould.pattern_fe.contact import touch
 from sandmould.pattern_fe.coupling.body import StaticSolution
 from sandmould.pattern_fe.elasticity import internal_force_n
-from sandmould.pattern_fe.large_displacement import Obstructed
 from sandmould.pattern_fe.pattern import Pattern
 from sandmould.pattern_fe.surroundings import Surroundings
 
@@ -46,53 +45,52 @@ class FoamBody:
         """
         self._pattern = pattern
         self._large = large
-        self._line = pattern.surface.outer_line
-        self._nodes = pattern.surface.nodes[self._line]
+        self._surface = pattern.surface.outer
+        self._motion = self._surface.motion
         self._surroundings = surroundings
-        self._obstructed = None if surroundings is None else Obstructed(surroundings, self._nodes)
         self._compliance: dict[int, Array] = {}
         """Displacements of the surface under 1 N on a component of it, by its number."""
 
     @property
     def vertices_m(self) -> Array:
         """Vertices of the outer surface as drawn, (nv, d) float64, m."""
-        return self._pattern.surface.vertices_m[self._line]
+        return self._surface.vertices_m
 
     def solve(self, load_n: Array) -> StaticSolution:
         """Find the pattern at rest under loads on the outer surface, (nv, d) float64, N."""
-        pattern = self._pattern
-        load = self._on_nodes(load_n)
+        pattern, load = self._pattern, self._motion.T @ load_n
         if self._large:
-            moved, touched = pattern.solve_large(load, self._obstructed)
+            moved, contact_n = pattern.solve_large(load, self._surroundings)
         else:
-            moved, touched = self._linear(load)
+            moved, contact_n = self._linear(load)
         reaction = self._inner_force_n(moved) - load
-        reaction[~(pattern.fixed | (touched != 0.0)).any(axis=1)] = 0.0
+        touched = self._motion.T @ contact_n != 0.0
+        reaction[~(pattern.fixed | touched).any(axis=1)] = 0.0
         reaction += pattern.bedding_force_n(moved)
         # Small displacements balance on the drawing, large ones where the nodes have come to.
         place_m = pattern.space.node_m + (moved if self._large else 0.0)
         outer = load + reaction
         moment = cross(place_m, outer).sum(axis=0)
         return StaticSolution(
-            moved[self._nodes],
+            self._motion @ moved,
+            moved,
             pattern.energy_j(moved, self._large),
             np.asarray(reaction.sum(axis=0)),
             float(np.linalg.norm(moment)),
-            touched[self._nodes] if touched.any() else None,
+            contact_n if contact_n.any() else None,
         )
 
     def _linear(self, load: Array) -> tuple[Array, Array]:
-        """Small displacements of all nodes, and the loads of what they touch.
+        """Small displacements of all nodes, and the loads of what the vertices touch.
 
         Floor and walls are planes: one problem has their reactions. Round obstacles their gaps are
         linearised where the pattern has come to, from the drawing on, until it stays there.
         """
         pattern, around = self._pattern, self._surroundings
-        touched = np.zeros_like(load)
-        moved = pattern.solve_linear(load)
-        if around is None or around.is_clear(moved[self._nodes]):
-            return moved, touched
-        free_m, at_m = moved[self._nodes], np.zeros_like(self.vertices_m)
+        moved, at_m = pattern.solve_linear(load), np.zeros_like(self.vertices_m)
+        free_m = self._motion @ moved
+        if around is None or around.is_clear(free_m):
+            return moved, at_m
         for number in range(_LINEARISATIONS):
             contact = touch(around, at_m, free_m, self._response)
             led_m = free_m if contact is None else contact.moved_m
@@ -102,10 +100,9 @@ class FoamBody:
             at_m = led_m if number < _WHOLE_WAYS else 0.5 * (at_m + led_m)
             if stays or (not around.solids and around.deepest_m(at_m) <= near_m):
                 break
-        if contact is not None:
-            touched[self._nodes] = contact.load_n
-            moved = pattern.solve_linear(load + touched)
-        return moved, touched
+        if contact is None:
+            return moved, np.zeros_like(at_m)
+        return pattern.solve_linear(load + self._motion.T @ contact.load_n), contact.load_n
 
     def _response(self, load_n: Array) -> Array:
         """Displacements of the surface under loads on it, (nv d, m); those of one load are kept."""
@@ -113,17 +110,12 @@ class FoamBody:
             if entry not in self._compliance:
                 unit = np.zeros_like(self.vertices_m)
                 unit.ravel()[entry] = 1.0
-                moved = self._pattern.solve_linear(self._on_nodes(unit))
-                self._compliance[int(entry)] = moved[self._nodes].ravel()
+                moved = self._pattern.solve_linear(self._motion.T @ unit)
+                self._compliance[int(entry)] = (self._motion @ moved).ravel()
         used = np.flatnonzero(load_n.any(axis=1))
         if not len(used):
             return np.zeros_like(load_n)
         return np.column_stack([self._compliance[int(e)] for e in used]) @ load_n[used]
-
-    def _on_nodes(self, load_n: Array) -> Array:
-        on_surface = np.zeros_like(self._pattern.surface.vertices_m)
-        on_surface[self._line] = load_n
-        return self._pattern.on_nodes(on_surface)
 
     def _inner_force_n(self, moved_m: Array) -> Array:
         pattern = self._pattern

@@ -38,14 +38,13 @@ class FreeBody:
             The same in motion: where it is, and what it touches.
         """
         self._pattern, self._foam = pattern, foam
-        self._line = pattern.surface.outer_line
-        self._nodes = pattern.surface.nodes[self._line]
+        self._surface = pattern.surface.outer
         self._rigid = rigid_motions(pattern.space.node_m)
 
     @property
     def vertices_m(self) -> Array:
         """Vertices of the outer surface as drawn, (nv, d) float64, m."""
-        return self._pattern.surface.vertices_m[self._line]
+        return self._surface.vertices_m
 
     @cached_property
     def _loose(self) -> NDArray[np.int64]:
@@ -61,8 +60,7 @@ class FreeBody:
         """Find the shape under loads on the outer surface, (nv, d) float64, N."""
         pattern, rigid = self._pattern, self._rigid
         contact_n = self._foam.mean_contact_n
-        whole = np.zeros_like(pattern.space.node_m)
-        whole[self._nodes] = load_n + contact_n
+        whole = self._surface.motion.T @ (load_n + contact_n)
         inertia = np.repeat(pattern.mass_kg, whole.shape[1])[:, None] * rigid
         left = rigid.T @ whole.ravel()
         balanced = whole.ravel() - inertia @ np.linalg.solve(rigid.T @ inertia, left)
@@ -72,10 +70,11 @@ class FreeBody:
         rigid_there = self._at(rigid)
         away = self._foam.displacement_m.ravel() - on_surface[:, 0]
         place, *_ = np.linalg.lstsq(rigid_there, away, rcond=None)
-        moved_m = (on_surface[:, 0] + rigid_there @ place).reshape(load_n.shape)
+        nodes_m = (shape + rigid @ place).reshape(whole.shape)
         moment = cross(pattern.space.node_m, whole).sum(axis=0)
         return StaticSolution(
-            moved_m,
+            self._surface.motion @ nodes_m,
+            nodes_m,
             0.5 * float(shape @ balanced),
             np.asarray(contact_n.sum(axis=0)),
             float(np.linalg.norm(moment)),
@@ -83,7 +82,7 @@ class FreeBody:
         )
 
     def _at(self, columns: Array) -> Array:
-        """Rows of the components of the outer surface."""
-        d = self._pattern.space.dimension
-        rows = (self._nodes[:, None] * d + np.arange(d)).ravel()
-        return np.asarray(columns[rows])
+        """Motions of the outer surface, (nv d, k), for those of all nodes, (n d, k)."""
+        motion = self._surface.motion
+        moved = motion @ columns.reshape(motion.shape[1], -1)
+        return np.asarray(moved.reshape(-1, columns.shape[1]))

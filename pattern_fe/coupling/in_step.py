@@ -29,6 +29,10 @@ class InStepEntry(WindowEntry):
     """Taken by the mass damping."""
     balance_j: float
     """Work less all four energies, that which contact took among them: round-off."""
+    first_hz: float
+    """First frequency of the scaled masses."""
+    own_first_hz: float
+    """The same of the foam's own."""
 
 
 class InStepSession(SteppedSession[InStepFoam]):
@@ -87,6 +91,8 @@ class InStepSession(SteppedSession[InStepFoam]):
                 kinetic_j=kinetic_j,
                 damped_j=foam.damped_j,
                 balance_j=foam.work_j - elastic_j - kinetic_j - foam.damped_j - foam.contact_j,
+                first_hz=foam.mass.first_hz,
+                own_first_hz=foam.mass.own_first_hz,
             )
         )
         self._shapes.write(self.sand.time_s, moved_m)

@@ -6,6 +6,7 @@ nothing from the staggered loop: neither its loads, which are means over windows
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -47,6 +48,10 @@ class MonolithicEntry:
     """Taken by contact with them: the kinetic energy of vertices that they stop."""
     balance_j: float
     """Work less all four energies: round-off."""
+    first_hz: float
+    """First frequency of the scaled masses."""
+    own_first_hz: float
+    """The same of the foam's own."""
 
 
 class MonolithicSession(SteppedSession[ExplicitFoam]):
@@ -140,6 +145,8 @@ class MonolithicSession(SteppedSession[ExplicitFoam]):
                 contact_n=force_n(foam.contact_n),
                 contact_j=foam.contact_j,
                 balance_j=foam.work_j - elastic_j - kinetic_j - foam.damped_j - foam.contact_j,
+                first_hz=foam.first_hz,
+                own_first_hz=foam.first_hz * math.sqrt(foam.mass_scale),
             )
         )
         self._shapes.write(self.time_s, displacement)

@@ -143,7 +143,7 @@ class AitkenRelaxation(Relaxation):
         self._led = self.factor
         if self.is_calm:
             self.factor = self._first
-        elif self._last is not None and (residual != self._last).any():
+        elif self._last is not None:
             factor = self.factor * self._secant(self._last, residual)
             self.factor = float(np.clip(factor, self._least, self._most))
         if self._too_far is not None and residual.any():
@@ -156,9 +156,13 @@ class AitkenRelaxation(Relaxation):
 
     @staticmethod
     def _secant(before: Array, after: Array) -> float:
-        """Part of the way from one residual to another at which it would vanish."""
+        """Part of the way from one residual to another at which it would vanish.
+
+        All of it where they differ by less than squares of numbers can tell: the factor stays.
+        """
         change = after - before
-        return -float(before @ change) / float(change @ change)
+        square = float(change @ change)
+        return -float(before @ change) / square if square > 0.0 else 1.0
 
     def state(self) -> dict[str, Array]:
         """The last residual and factors."""

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from typing import get_args
 
 from threadpoolctl import threadpool_limits
@@ -161,8 +162,8 @@ def in_step_foam(scenario: Scenario, pattern: Pattern) -> InStepFoam:
     Raises
     ------
     BadInputError
-        With large displacements, or with masses so large that the pattern swings with the box
-        where the foam's own would not.
+        With large displacements, with masses so large that the pattern swings with the box where
+        the foam's own would not, or with a scale that contacts do not leave to it.
     """
     loop = _loop_of_small_displacements(scenario)
     # Threads of small matrices wait for one another, longest beside other runs.
@@ -177,6 +178,15 @@ def in_step_foam(scenario: Scenario, pattern: Pattern) -> InStepFoam:
             surroundings_of(scenario, pattern),
         )
     mass, shaken_hz = foam.mass, _shaken_hz(scenario)
+    if loop.mass_scale is not None:
+        asked_hz = mass.own_first_hz / math.sqrt(loop.mass_scale)
+        if mass.first_hz < LIKE_FOAM * asked_hz:
+            valid = (
+                f"one at which contacts in a step of {scenario.step_s:.3g} s leave the pattern its "
+                f"first frequency, {asked_hz:.3g} Hz, not {mass.first_hz:.3g} Hz; a smaller "
+                "time_step.fraction, or null"
+            )
+            raise _bad("mass_scale", loop.mass_scale, valid)
     if mass.first_hz < min(ABOVE_VIBRATION * shaken_hz, LIKE_FOAM * mass.own_first_hz):
         also = f" or {LIKE_FOAM:g} times the foam's own {mass.own_first_hz:.3g} Hz"
         raise _swings(mass.scale, mass.first_hz, shaken_hz, also)

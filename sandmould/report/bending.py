@@ -20,7 +20,7 @@ from sandmould.kinds.sand.bending import convergence_log_of, verdict_of
 from sandmould.pattern_fe.coupling.loop_verdict import LoopVerdict, study_sentence
 from sandmould.pattern_fe.quality import mesh_sentence
 from sandmould.pattern_fe.scene import pattern_of
-from sandmould.report.bending_figures import coupling_map, draw_outlines
+from sandmould.report.bending_figures import coupling_map, draw_distances, draw_outlines
 from sandmould.report.curves import runs_of, setting_tints, time_chart
 from sandmould.report.tables import Cell, Column, Table
 from sandmould.runs.columns import (
@@ -79,11 +79,14 @@ def bending_pages(
         "sentences": (
             study_sentence(list(verdicts.values())),
             *_tip_sentences(own, verdicts.get(pictured_run), scenario),
+            *_foam_sentences(own, scenario),
             *drawing_sentences(scenario),
         ),
         "deflection": deflection_chart(collected, verdict),
         "outlines": picture,
         "outlines_note": note,
+        "tolerance_m": scenario.pattern.tolerance_m if scenario.pattern else None,
+        "distances": draw_distances(study_folder / "runs" / pictured_run, scenario),
         "map": coupling_map(collected, {run: v.state for run, v in verdicts.items()}),
         "convergence": () if log is None else convergence_charts(log, _begins_s(own)),
         "pictured_run": pictured_run,
@@ -126,6 +129,31 @@ def _tip_sentences(
         shaken_s=last[VIBRATION_TIME_S] if scenario.vibrations and len(shaken) > 1 else 0.0,
         back=1.0 - last[TIP] / first[TIP] if first[TIP] else 0.0,
         recovers=_RECOVERS,
+    )
+
+
+def _foam_sentences(rows: pd.DataFrame, scenario: Scenario) -> tuple[str, ...]:
+    """Distances, stress and supports at the end of the run that is shown."""
+    assert scenario.pattern is not None
+    if rows.empty:
+        return ()
+    last, pattern = rows.iloc[-1], scenario.pattern
+    supports_n = {axis: last.get(f"pattern_support_{axis}_n", 0.0) for axis in "xyz"}
+    round_off_n = 1e-9 * max(abs(force_n) for force_n in supports_n.values())
+    return sentences(
+        "foam.j2",
+        largest_mm=1e3 * last["pattern_distance_largest_m"],
+        tolerance_mm=1e3 * (pattern.tolerance_m or 0.0),
+        outside=last.get("pattern_outside_tolerance_fraction", 0.0),
+        von_mises_kpa=1e-3 * last.get("pattern_von_mises_largest_pa", math.nan),
+        compression_kpa=1e-3 * last.get("pattern_compression_largest_pa", math.nan),
+        strength_kpa=1e-3 * (pattern.crush_strength_pa or 0.0),
+        crushed=last.get("pattern_crushed_fraction", 0.0),
+        supports=[
+            (axis, force_n if abs(force_n) > round_off_n else 0.0)
+            for axis, force_n in list(supports_n.items())[: scenario.dimension]
+        ],
+        kept=last.get("pattern_frequency_fraction", 1.0),
     )
 
 

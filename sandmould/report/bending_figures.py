@@ -10,12 +10,18 @@ from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from pathlib import Path
 
+import meshio
 import numpy as np
 import pandas as pd
+from matplotlib import colormaps
 from matplotlib.axes import Axes
+from matplotlib.cm import ScalarMappable
+from matplotlib.collections import LineCollection
+from matplotlib.colors import Normalize
 from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 from matplotlib.patches import Polygon
+from mpl_toolkits.mplot3d.art3d import Poly3DCollection
 
 from sandmould.drawing.figures import png
 from sandmould.geometry.geometry import Array, Solid
@@ -171,8 +177,53 @@ def draw_outlines(run_folder: Path, scenario: Scenario) -> tuple[str, str]:
             ax.add_patch(Polygon(line_m * _MM, fill=False, edgecolor=colour, lw=1.8))
         ax.plot([], [], color=colour, lw=1.8, label=label)
     _frame(figure, np.concatenate([drawn.corners(), *outlines_m.values()])[:, [0, -1]] * _MM)
+    ax.legend(frameon=False, loc="lower right")
     said = ", ".join(["as drawn (broken line)", *(_STYLES[name][0] for name in outlines_m)])
     return png(figure), said
+
+
+def draw_distances(run_folder: Path, scenario: Scenario) -> str:
+    """Draw the bent surface at the end of a run, coloured by its distance from the drawing.
+
+    The colours end at the tolerance, where there is one; what is beyond it is black.
+
+    Returns
+    -------
+    str
+        PNG as a ``data:`` address; empty where the run left no surface.
+    """
+    path = run_folder / "exports" / "pattern_final.vtu"
+    if not path.is_file() or scenario.pattern is None:
+        return ""
+    surface = meshio.read(path)
+    facets, away_mm = surface.cells[0].data, surface.point_data["distance_m"] * _MM
+    most_mm = (scenario.pattern.tolerance_m or 0.0) * _MM or float(np.abs(away_mm).max())
+    colours = colormaps["coolwarm"].with_extremes(under="black", over="black")
+    shown = ScalarMappable(Normalize(-most_mm, most_mm), colours)
+    corners = surface.points[facets] * _MM
+    tints = shown.to_rgba(away_mm[facets].mean(axis=1))
+    figure = Figure(dpi=110, layout="constrained")
+    if scenario.dimension == 2:
+        flat = figure.add_subplot()
+        flat.add_collection(LineCollection(list(corners[..., :2]), colors=tints, lw=4))
+        _frame(figure, surface.points[:, :2] * _MM)
+    else:
+        space = figure.add_subplot(projection="3d", proj_type="ortho")
+        space.add_collection3d(Poly3DCollection(list(corners), facecolors=tints))
+        low, high = corners.min(axis=(0, 1)), corners.max(axis=(0, 1))
+        space.set(xlim=(low[0], high[0]), ylim=(low[1], high[1]), zlim=(low[2], high[2]))
+        space.set(xlabel="x, mm", ylabel="y, mm", zlabel="height, mm")
+        space.set_box_aspect(high - low)
+        figure.set_size_inches(_WIDTH_IN, 0.7 * _WIDTH_IN)
+    figure.set_figheight(figure.get_figheight() + 0.9)
+    figure.colorbar(
+        shown,
+        ax=figure.axes,
+        label="outside the drawing, mm",
+        location="bottom",
+        extend="both" if np.abs(away_mm).max() > most_mm else "neither",
+    )
+    return png(figure)
 
 
 def _lines_m(drawn: Solid, vertices_m: Array) -> list[Array]:
@@ -197,4 +248,3 @@ def _frame(figure: Figure, points_mm: Array) -> None:
     ax.spines[["top", "right"]].set_visible(False)
     ax.set_xlabel("x, mm")
     ax.set_ylabel("height, mm")
-    ax.legend(frameon=False, loc="lower right")

@@ -226,6 +226,17 @@ class PatternConfig(Section):
     )
     poisson_ratio: float = quantity(0.35, "Poisson's ratio.", source=ROJEK, gt=-1, lt=0.5)
     density_kg_m3: float = quantity(12.0, "Density.", unit="kg/m3", source=ROJEK, gt=0, le=3e4)
+    crush_strength_pa: float | None = quantity(
+        None,
+        "Compression at which the foam crushes; without it nothing is said of crushing.",
+        unit="Pa",
+        source="user",
+        gt=0,
+        le=1e12,
+    )
+    tolerance_m: float | None = quantity(
+        None, "Distance from the drawing that passes.", unit="m", source="user", gt=0, le=1
+    )
     supports: SupportsConfig = Field(
         SupportsConfig(), description="What holds the pattern in the box."
     )

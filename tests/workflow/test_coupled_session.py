@@ -51,7 +51,7 @@ class Plate:
         force_n = load_n.sum(axis=0)
         sinks = np.zeros_like(self.vertices_m)
         sinks[:, 1] = force_n[1] / self.stiffness_n_m
-        return StaticSolution(sinks, 0.5 * force_n[1] ** 2 / self.stiffness_n_m, -force_n)
+        return StaticSolution(sinks, sinks, 0.5 * force_n[1] ** 2 / self.stiffness_n_m, -force_n)
 
 
 def settings(**changes: Any) -> Loop:

@@ -11,6 +11,7 @@ import pandas as pd
 
 from sandmould.analysis.deflection import deflection, farthest_corner
 from sandmould.engines.snapshot import Snapshot
+from sandmould.pattern_fe.coupling.body import StaticSolution
 from sandmould.pattern_fe.coupling.convergence_log import CONVERGENCE_LOG, read_convergence_log
 from sandmould.pattern_fe.coupling.foam_body import FoamBody
 from sandmould.pattern_fe.coupling.gain_prediction import predicted_gain
@@ -21,6 +22,7 @@ from sandmould.pattern_fe.loads import pressure_above_and_below_pa
 from sandmould.pattern_fe.pattern import Pattern
 from sandmould.pattern_fe.perimeter import Perimeter
 from sandmould.pattern_fe.scene import pattern_of, surroundings_of
+from sandmould.pattern_fe.supports import AXES
 from sandmould.runs.outcome import Outcome, RunOutcome
 from sandmould.runs.run_tables import read_costs
 from sandmould.scenario.scenario import Scenario
@@ -36,18 +38,19 @@ class BentPattern:
         """Take the pattern of a scenario that has one."""
         config = scenario.pattern
         assert config is not None
-        self._scenario = scenario
+        self._scenario, self._config = scenario, config
         self.pattern: Pattern = pattern_of(scenario)
         self.drawn: Perimeter = self.pattern.surface.outer
         """The surface that the sand meets, as drawn; in 2D a line."""
         held = self.pattern.space.node_m[self.pattern.fixed.any(axis=1)]
         if not len(held):
             held = self.pattern.space.node_m.mean(axis=0, keepdims=True)
-        self._free = np.logical_not(self.pattern.fixed[self.drawn.nodes].any(axis=1))
+        self._free = np.logical_not(self.drawn.held(self.pattern.fixed).any(axis=1))
         self.tip = farthest_corner(self.drawn.vertices_m, held)
         """Its vertex farthest from the supports, or from its middle where it has none."""
         around = surroundings_of(scenario, self.pattern)
-        self._body = FoamBody(self.pattern, config.statics == "large", around)
+        self.is_large = config.statics == "large"
+        self._body = FoamBody(self.pattern, self.is_large, around)
 
     @property
     def reach_m(self) -> float:
@@ -67,30 +70,57 @@ class BentPattern:
             "pattern_distance_largest_m": away.largest_m,
             "pattern_distance_rms_m": away.rms_m,
         }
+        if self._config.tolerance_m is not None:
+            area_m2 = drawn.vertex_area_m2
+            far = np.abs(away.vertex_m) > self._config.tolerance_m
+            row["pattern_outside_tolerance_fraction"] = area_m2[far].sum() / area_m2.sum()
         if snapshot.pattern_load_n is not None:
             load_n = snapshot.pattern_load_n
-            row["pattern_tip_answered_m"] = self._answered_m(load_n)
             row[ABOVE], row[BELOW] = pressure_above_and_below_pa(drawn, load_n, self._free)
+            row |= self._rest_row(load_n)
         return row | self._predicted
 
     @cached_property
     def _predicted(self) -> Row:
         """What the scenario alone tells of its loop in 2D; nothing of one without windows."""
-        config = self._scenario.pattern
-        assert config is not None
-        if self._scenario.dimension == 3 or not config.loop.has_windows:
+        loop = self._config.loop
+        if self._scenario.dimension == 3 or not loop.has_windows:
             return {}
-        gain = predicted_gain(self._scenario, self.pattern, config.loop.window_s)
+        gain = predicted_gain(self._scenario, self.pattern, loop.window_s)
         return {"pattern_predicted_gain": gain.gain, "pattern_predicted_limit": gain.limit}
 
-    def _answered_m(self, load_n: np.ndarray) -> float:
-        """Deflection of the tip at rest under a load; NaN where there is no rest."""
+    def _rest_row(self, load_n: np.ndarray) -> Row:
+        """Tip, stress and supports at rest under a load; the tip alone, NaN, without a rest."""
+        solution, pattern = self.at_rest(load_n), self.pattern
+        if solution is None:
+            return {"pattern_tip_answered_m": np.nan}
+        compression_pa = pattern.compression_pa(solution.nodes_m, self.is_large)
+        row = {
+            "pattern_tip_answered_m": -float(solution.displacement_m[self.tip, -1]),
+            "pattern_von_mises_largest_pa": pattern.von_mises_pa(
+                solution.nodes_m, self.is_large
+            ).max(),
+            "pattern_compression_largest_pa": compression_pa.max(),
+        }
+        if self._config.crush_strength_pa is not None:
+            volume = pattern.space.weight.sum(axis=1)
+            crushed = compression_pa > self._config.crush_strength_pa
+            row["pattern_crushed_fraction"] = volume[crushed].sum() / volume.sum()
+        touched_n = 0.0 if solution.contact_n is None else solution.contact_n.sum(axis=0)
+        held_n = solution.reaction_n - touched_n
+        return row | {
+            f"pattern_support_{axis}_n": force_n
+            for axis, force_n in zip(AXES, held_n, strict=False)
+        }
+
+    def at_rest(self, load_n: np.ndarray) -> StaticSolution | None:
+        """The pattern at rest under a load of the sand; None where there is no rest."""
         if self.pattern.is_free:
-            return np.nan
+            return None
         try:
-            return -float(self._body.solve(load_n).displacement_m[self.tip, -1])
+            return self._body.solve(load_n)
         except LoadNotReachedError:
-            return np.nan
+            return None
 
 
 def add_loop(table: pd.DataFrame, folder: Path, reach_m: float) -> pd.DataFrame:
@@ -164,6 +194,8 @@ def _by_snapshot(log: pd.DataFrame, time_s: pd.Series[float], reach_m: float) ->
             "pattern_windows": by["passes"].size().cumsum(),
             "pattern_passes": by["passes"].sum().cumsum(),
         }
+    if "own_first_hz" in log:
+        columns["pattern_frequency_fraction"] = by["first_hz"].last() / by["own_first_hz"].last()
     at = time_s.dropna().index
     return {
         name: pd.Series(values.reindex(range(len(at))).ffill().to_numpy(), at)

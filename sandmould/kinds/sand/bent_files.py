@@ -6,7 +6,7 @@ from pathlib import Path
 
 from sandmould.kinds.sand.bending import BentPattern
 from sandmould.kinds.sand.moments import Moment, list_moments
-from sandmould.pattern_fe.export import write_stl, write_surface
+from sandmould.pattern_fe.export import write_solid, write_stl, write_surface
 from sandmould.scenario.scenario import Scenario
 
 
@@ -39,3 +39,32 @@ def write_bent(scenario: Scenario, run_folder: Path, out: Path) -> None:
         stl = out / f"pattern_{name}.stl"
         write_stl(stl, pattern.space, pattern.surface, pattern.spread(moved_m))
         write_surface(stl.with_suffix(".vtu"), bent.drawn, moved_m, snapshot.pattern_load_n)
+
+
+def write_solids(scenario: Scenario, moments: tuple[Moment, ...], out: Path) -> None:
+    """Write the whole pattern with its stress at the end of every stage (.vtu).
+
+    It is at rest under the mean load of the record, or bent as its surface is where it has no rest.
+
+    Parameters
+    ----------
+    scenario : Scenario
+        With a pattern.
+    moments : tuple of Moment
+        Of a run.
+    out : Path
+        Folder of ``pattern_settle_1.vtu`` and its likes.
+    """
+    bent = BentPattern(scenario)
+    last = {snapshot.stage: snapshot for snapshot in (moment.load() for moment in moments)}
+    for stage, snapshot in last.items():
+        if snapshot.pattern_m is None or snapshot.pattern_load_n is None:
+            continue
+        rest = bent.at_rest(snapshot.pattern_load_n)
+        moved_m = snapshot.pattern_m - bent.drawn.vertices_m
+        nodes_m = bent.pattern.spread(moved_m) if rest is None else rest.nodes_m
+        stress = {
+            "von_mises_pa": bent.pattern.von_mises_pa(nodes_m, bent.is_large),
+            "compression_pa": bent.pattern.compression_pa(nodes_m, bent.is_large),
+        }
+        write_solid(out / f"pattern_{stage}.vtu", bent.pattern.space, nodes_m, stress)

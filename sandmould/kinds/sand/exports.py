@@ -42,4 +42,8 @@ def write_exports(scenario: Scenario, folder: Path, out: Path) -> None:
             snapshot = moment.load()
             to_vtk(snapshot, written / f"{moment.stored.name}.vtu")
             to_ovito(snapshot, written / f"{moment.stored.name}.dump")
+        if scenario.pattern is not None:
+            from sandmould.kinds.sand.bent_files import write_solids  # scikit-fem: few need it
+
+            write_solids(scenario, moments, written)
         write_zip(partial, {path.name: path for path in written.iterdir()})

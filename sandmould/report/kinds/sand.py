@@ -117,7 +117,7 @@ def _sand_figures(
     if filling:
         files["filling"] = filling.chart
     if bending:
-        files |= pictures(pattern=bending["outlines"])
+        files |= pictures(pattern=bending["outlines"], distances=bending["distances"])
     if bending and bending["deflection"]:
         files["deflection"] = bending["deflection"]
     return files | curve_figures(pages["tubes"])

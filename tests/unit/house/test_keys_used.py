@@ -36,6 +36,8 @@ PHYSICS = {
     "Loop.mass_scale": "tests/verification/test_coupling_monolithic.py",
     "Loop.damping_ratio": "tests/verification/test_coupling_monolithic.py",
     **{f"Taken.{key}": "tests/workflow/test_deck_run.py" for key in Taken.model_fields},
+    "PatternConfig.crush_strength_pa": "tests/unit/kinds/test_sand_bending.py",
+    "PatternConfig.tolerance_m": "tests/unit/kinds/test_sand_bending.py",
     "PatternConfig.depth_m": "tests/unit/pattern_fe/test_pattern_scene.py",
 }
 """Keys that no shipped study sets, each with the test that knows the exact answer."""

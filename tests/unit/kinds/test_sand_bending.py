@@ -11,8 +11,9 @@ import pytest
 
 from sandmould.definition.run import Run
 from sandmould.kinds.sand.bending import verdict_of
-from sandmould.kinds.sand.bent_files import write_bent
+from sandmould.kinds.sand.bent_files import write_bent, write_solids
 from sandmould.kinds.sand.measure import write_measures
+from sandmould.kinds.sand.moments import list_moments
 from sandmould.pattern_fe.coupling.convergence_log import CONVERGENCE_LOG
 from sandmould.pattern_fe.coupling.foam_body import FoamBody
 from sandmould.pattern_fe.coupling.interface import with_surface
@@ -20,7 +21,7 @@ from sandmould.pattern_fe.scene import pattern_of
 from sandmould.runs.outcome import Outcome, RunOutcome
 from sandmould.scenario.scenario import Scenario
 from sandmould.study.plan.plan_files import read_run
-from tests.bent_run import SCENE, tip_load, write_bent_run
+from tests.bent_run import FORCE_N, SCENE, tip_load, write_bent_run
 from tests.planned import write_plan
 
 
@@ -61,6 +62,52 @@ def test_shape_and_answer_are_those_of_the_loads(folder: Path, body: FoamBody) -
     # The flange sinks by nearly what its tip does, which a corner's distance cannot exceed.
     assert 0.8 * tip_m < table.pattern_distance_largest_m.iloc[1] <= largest_m
     assert 0.0 < table.pattern_distance_rms_m.iloc[1] < table.pattern_distance_largest_m.iloc[1]
+
+
+def test_supports_carry_the_sand_and_stress_is_that_of_the_load(
+    folder: Path, body: FoamBody, scenario: Scenario
+) -> None:
+    table = measured(folder)
+    # To the last digit that a table has, below a millionth of the load.
+    assert table.pattern_support_y_n.to_list() == pytest.approx([-FORCE_N] * 4, rel=1e-7)
+    assert table.pattern_support_x_n.to_list() == pytest.approx([0.0] * 4, abs=1e-7 * -FORCE_N)
+    pattern = pattern_of(scenario)
+    nodes_m = pattern.solve_linear(pattern.on_nodes(tip_load(body)[0]))
+    stress_pa = pattern.compression_pa(nodes_m)
+    assert table.pattern_compression_largest_pa.iloc[-1] == pytest.approx(stress_pa.max())
+    # Plane strain: what is squeezed one way is squeezed across the plane too.
+    assert table.pattern_von_mises_largest_pa.iloc[-1] < 1.1 * stress_pa.max()
+    assert "pattern_crushed_fraction" not in table
+    told = scenario.model_copy(
+        update={
+            "pattern": scenario.pattern.model_copy(  # type: ignore[union-attr]
+                update={"crush_strength_pa": 0.5 * stress_pa.max(), "tolerance_m": 1e-5}
+            )
+        }
+    )
+    write_measures(told, folder, folder / "told.tsv")
+    told_table = pd.read_csv(folder / "told.tsv", sep="\t")
+    share = np.average(stress_pa > 0.5 * stress_pa.max(), weights=pattern.space.weight.sum(axis=1))
+    assert 0.0 < share < 0.5
+    assert told_table.pattern_crushed_fraction.to_list() == pytest.approx([share] * 4)
+    # As drawn nothing is outside; bent, all of the flange is and the foot is not.
+    outside = told_table.pattern_outside_tolerance_fraction
+    assert outside.iloc[0] == 0.0
+    assert 0.3 < outside.iloc[1] < 1.0
+
+
+def test_the_solid_of_every_stage_has_its_stress(folder: Path, scenario: Scenario) -> None:
+    write_solids(scenario, list_moments(folder), folder)
+    assert sorted(p.name for p in folder.glob("pattern_*.vtu")) == [
+        "pattern_settle_1.vtu", "pattern_vibrate_1.vtu"
+    ]  # fmt: skip
+    solid = meshio.read(folder / "pattern_settle_1.vtu")
+    largest = measured(folder)[["pattern_von_mises_largest_pa", "pattern_compression_largest_pa"]]
+    for name, value in zip(("von_mises_pa", "compression_pa"), largest.iloc[-1], strict=True):
+        assert solid.cell_data[name][0].max() == pytest.approx(value)
+    assert solid.cells[0].type == "quad"
+    bent_m = np.linalg.norm(solid.point_data["displacement_m"], axis=1).max()
+    assert bent_m == pytest.approx(measured(folder).pattern_largest_displacement_m[1], rel=0.01)
 
 
 def test_windows_of_the_log_go_to_the_snapshot_that_ends_them(folder: Path) -> None:

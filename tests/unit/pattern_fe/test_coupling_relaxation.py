@@ -140,3 +140,13 @@ def test_memory_is_taken_up(fresh: type[Relaxation]) -> None:
     later.restore(first.state())
     for shown, answered in seen[4:]:
         np.testing.assert_array_equal(later.next(shown, answered), straight.next(shown, answered))
+
+
+@pytest.mark.parametrize("is_iterated", [False, True])
+def test_residuals_too_alike_to_tell_a_secant_leave_the_factor(is_iterated: bool) -> None:
+    relaxation = AitkenRelaxation(0.1, 0.01, 0.5)
+    relaxation.begin_window(is_iterated)
+    x = np.zeros(2)
+    for residual in (np.array([1e-170, 0.0]), np.array([5e-170, 0.0])):
+        ahead = relaxation.next(x, x + residual)
+    np.testing.assert_array_equal(ahead, 0.1 * residual)

@@ -128,6 +128,7 @@ def test_a_pattern_that_cannot_be_computed_is_told(pattern: dict[str, Any], says
         ({"loop": {"scheme": "monolithic", "mass_scale": 1.0}}, {}, "contacts would throw its li"),
         ({}, {"vibration": [{"acceleration_g": 1.0}]}, "pattern's first frequency, now .* Hz, is"),
         ({"loop": {"scheme": "in_step"}, "statics": "large"}, {}, "scheme = 'in_step' .* = large"),
+        ({"loop": {"scheme": "in_step", "mass_scale": 1e-3}}, {}, "mass_scale = .* leave the pat"),
         ({"loop": {"scheme": "in_step", "mass_scale": 1e4}},
          {"vibration": [{"acceleration_g": 1.0}]}, "50 Hz or 0.9 times the foam's own"),
     ],

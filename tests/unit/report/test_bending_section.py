@@ -20,6 +20,7 @@ from sandmould.pattern_fe.coupling.interface import with_surface
 from sandmould.pattern_fe.scene import pattern_of
 from sandmould.report.bending import (
     TIP,
+    _foam_sentences,
     bending_pages,
     deflection_chart,
     paper_sentences,
@@ -92,10 +93,32 @@ def test_the_page_tells_what_became_of_the_pattern(study: Path, text: str) -> No
     assert "(mean of 3 fillings, 95 % interval): the tip comes back" in page.text
     assert "with factor 1" in page.text
     names = {path.name for path in (study / "figures").iterdir()}
-    assert {"pattern.png", "deflection.svg"} <= names
+    assert {"pattern.png", "distances.png", "deflection.svg"} <= names
+    assert "coloured by its distance from the drawing" in page.text
+    assert "springs back to its drawing" in page.text
+    assert "The force of its supports is 0 N along x, 0.200 N along y." in page.text
+    assert "Its masses are scaled" not in page.text
     links = {a["href"] for a in page.of("a") if "pattern_final" in a["href"]}
     assert links == {f"runs/{n}/exports/pattern_final.{s}" for n in SHARES for s in ("vtu", "stl")}
     assert all((study / link).is_file() for link in links)
+
+
+def test_limits_of_foam_and_scaled_masses_are_told(study: Path) -> None:
+    scenario = read_run(study / "runs" / "one" / "scenario.yaml").scenario
+    assert scenario.pattern is not None
+    limits = {"tolerance_m": 5e-4, "crush_strength_pa": 1e5}
+    told = scenario.model_copy(update={"pattern": scenario.pattern.model_copy(update=limits)})
+    collected, _ = gathered(study)
+    rows = collected.curves.assign(
+        pattern_outside_tolerance_fraction=0.25,
+        pattern_crushed_fraction=0.03,
+        pattern_frequency_fraction=0.4,
+    )
+    said = " ".join(_foam_sentences(rows, told))
+    assert "25 % of it is beyond the tolerance of 0.500 mm." in said
+    assert "3 % of the foam is above its crushing strength of 100 kPa" in said
+    assert "it swings at 40 % of its own frequency" in said
+    assert "bends it by up to 60 % less" in said
 
 
 def test_a_loop_that_does_not_hold_is_marked(study: Path) -> None:
