@@ -11,9 +11,23 @@ from pathlib import Path
 from sandmould.digest import file_digest
 from sandmould.limits import DRAWING_BYTES
 
+STEP_SUFFIXES = (".step", ".stp")
+TOLD_UNIT = (*STEP_SUFFIXES, ".3mf")
+"""Endings of files that tell their own unit: they are read in metres."""
+
 
 class MeshFileError(ValueError):
     """A file that bounds no solid; its text says what would be valid."""
+
+
+def is_step(path: Path) -> bool:
+    """Whether a file's name says that it is a STEP file."""
+    return path.suffix.lower() in STEP_SUFFIXES
+
+
+def tells_unit(path: Path) -> bool:
+    """Whether a file's name says that it tells its own unit."""
+    return path.suffix.lower() in TOLD_UNIT
 
 
 def file_hash(path: Path) -> str:

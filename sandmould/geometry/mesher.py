@@ -20,16 +20,9 @@ from sandmould.geometry.drawing_file import MeshFileError
 
 Array = NDArray[np.float64]
 Ints = NDArray[np.int64]
-STEP_SUFFIXES = (".step", ".stp")
-"""Endings of STEP files; they tell their own unit."""
 LONGEST_S = 600.0
 """A mesh that takes longer is given up."""
 _JOB = "sandmould.geometry.mesher_job"
-
-
-def is_step(path: Path) -> bool:
-    """Whether a file's name says that it is a STEP file."""
-    return path.suffix.lower() in STEP_SUFFIXES
 
 
 def step_surface(path: Path) -> tuple[Array, Ints]:
