@@ -46,6 +46,17 @@ def coarser(drawn: TriangleMesh) -> TriangleMesh:
     return drawn
 
 
+def without_slivers(drawn: TriangleMesh) -> TriangleMesh:
+    """A closed surface without the triangles that a flat face does not need."""
+    import fast_simplification
+
+    places, cells = fast_simplification.simplify(
+        drawn.vertices_m, drawn.triangles, target_reduction=0.9, lossless=True
+    )
+    cells = cells.astype(np.int64)
+    return TriangleMesh(drawn.name, places, cells) if _is_as(drawn, places, cells) else drawn
+
+
 def _is_as(drawn: TriangleMesh, places: Array, cells: Ints) -> bool:
     """Whether a surface is closed, of good triangles and nowhere too far from the drawn one."""
     mesh = TriangleMesh("coarser", places, cells)

@@ -102,7 +102,7 @@ def _read(path: Path, sha256: str) -> Reading:
         solid = TriangleMesh("drawn", *own)
     if whole.unknown_volume > MOST_UNKNOWN * solid.measure:
         raise MeshFileError(
-            f"a closed surface; its {whole.holes} holes leave "
+            f"a closed surface; the holes of this one leave "
             f"{whole.unknown_volume / solid.measure:.1%} of its volume unknown, and up to "
             f"{MOST_UNKNOWN:.0%} is closed here: close them in the program that drew it"
         )

@@ -16,7 +16,7 @@ from scipy.sparse.csgraph import connected_components
 from scipy.spatial import cKDTree
 
 from sandmould.geometry.drawing_file import MeshFileError
-from sandmould.geometry.mesh_shells import at, extent, flat_triangles, meeting_sides, sides_of
+from sandmould.geometry.mesh_shells import SAME, at, extent, flat_triangles, meeting_sides, sides_of
 from sandmould.geometry.outline import Outline, outline_fault
 from sandmould.geometry.plane_triangulation import triangulated
 
@@ -26,7 +26,10 @@ Flags = NDArray[np.bool_]
 MOVES = 1e-4
 """Share of the extent by which ends of open edges may move to close them: 0.01 mm of 100 mm."""
 LARGEST_HOLES = 0.1
-"""Share of the surface that holes may be, together."""
+"""Share of the surface that holes may be, together: beyond it an open box may be meant. A hole in
+a flat face does not count."""
+_FLAT_RAD = 1e-3
+"""A face goes on flat in the patch of a hole where it meets it at less than this."""
 _SMOOTH_RAD = np.radians(40.0)
 """A face goes on behind the rim of a hole where it meets the patch at less than this."""
 _MOST_ROUNDS = 40
@@ -66,13 +69,13 @@ def mended(vertices: Array, triangles: Ints) -> Mended:
     MeshFileError
         When the holes are too large to be closed.
     """
-    kept = _without_needless(vertices, triangles)
+    kept = _without_needless(vertices, triangles, lone=False)
     dropped = len(triangles) - len(kept)
     joined, near = 0, MOVES * extent(vertices)
     if _is_open(kept):
         moved = _together(vertices, kept, near)
         joined = int((moved != np.arange(len(vertices))).sum())
-        closer = _without_needless(vertices, moved[kept])
+        closer = _without_needless(vertices, moved[kept], lone=True)
         dropped += len(kept) - len(closer)
         kept = _split_at_points(vertices, closer, near)
         joined += len(kept) - len(closer)
@@ -96,8 +99,11 @@ def _is_open(triangles: Ints) -> bool:
     return bool((sides_of(triangles).shared == 1).any())
 
 
-def _without_needless(vertices: Array, triangles: Ints) -> Ints:
-    """Leave away triangles without area, those drawn twice, and those that bound nothing."""
+def _without_needless(vertices: Array, triangles: Ints, lone: bool) -> Ints:
+    """Leave away triangles without area, those drawn twice, and those that bound nothing.
+
+    Triangles that touch no other do not either, where ``lone`` says so.
+    """
     left = triangles[~flat_triangles(vertices, triangles)]
     # from the lowest vertex on: shells that touch may have one triangle in both ways
     start = left.argmin(axis=1)[:, None]
@@ -114,7 +120,7 @@ def _without_needless(vertices: Array, triangles: Ints) -> Ints:
         fin = (drawn[both.ravel()] == 2) & (count == 2).any(axis=1)
         uses = np.bincount(left.ravel(), minlength=len(vertices))
         flap = (count % 2 == 1).all(axis=1)
-        flap &= (count > 1).any(axis=1) | (uses[left] == 1).all(axis=1)
+        flap &= (count > 1).any(axis=1) | (lone & (uses[left] == 1).all(axis=1))
         if not (fin | flap).any():
             break
         left = left[~(fin | flap)]
@@ -217,23 +223,27 @@ def _patches(vertices: Array, triangles: Ints, rims: list[list[int]]) -> tuple[I
     normal = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
     length = np.linalg.norm(normal, axis=1)
     new: list[tuple[int, ...]] = []
-    area = unknown = 0.0
+    area = unknown = unframed = 0.0
     for rim in rims:
         number = sides.ends[rim, 1]
         place = vertices[number] - vertices[number].mean(axis=0)
         over = 0.5 * np.cross(place, np.roll(place, -1, axis=0)).sum(axis=0)
         own = float(np.linalg.norm(over))
+        if own <= (SAME * extent(vertices)) ** 2:
+            continue
         beside = normal[np.array(rim) // 3] / length[np.array(rim) // 3, None]
         tilt = np.arccos(np.clip(beside @ over / own, -1.0, 1.0))
         slope = np.tan(tilt[tilt < _SMOOTH_RAD]).max(initial=0.0)
         depth = np.abs(place @ over).max() / own + 0.25 * slope * np.sqrt(own / np.pi)
+        unframed += own if tilt.min() > _FLAT_RAD else 0.0
         area, unknown = area + own, unknown + own * float(depth)
         new.extend(tuple(number[list(t)]) for t in _filled(place, over / own))
-    share = area / (0.5 * float(length.sum()) + area)
+    share = unframed / (0.5 * float(length.sum()) + area)
     if share > LARGEST_HOLES:
+        holes = "1 hole in this one is" if len(rims) == 1 else f"{len(rims)} holes in this one are"
         place = at(vertices[sides.ends[rims[0][0], 0]])
         raise MeshFileError(
-            f"a closed surface; {len(rims)} holes in this one are {share:.0%} of it, {place}. "
+            f"a closed surface; {holes} {share:.0%} of it, {place}. "
             f"Up to {LARGEST_HOLES:.0%} are closed here: close the rest in the program that drew it"
         )
     return np.array(new, dtype=np.int64).reshape(-1, 3), area, unknown

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import re
+from itertools import pairwise
 from pathlib import Path
 
 import numpy as np
@@ -48,12 +49,16 @@ def read_stl(path: Path) -> Array:
         for start, what in _OTHERS.items():
             if content.startswith(start):
                 raise MeshFileError(f"an STL file; this one is {what}")
-        if not is_text:
+        if not is_text and number + there > 0:
             tells = f"its head tells {number:,} triangles, and {there:,} are there"
             raise MeshFileError(
                 f"an STL file that is whole; this one is cut or no STL file: {tells}"
             )
         corners = _corners_in(content)
+        if is_text and not content.lstrip().lower().startswith(b"solid") and not len(corners):
+            raise MeshFileError(
+                "an STL file, ASCII or binary, or one of OBJ, PLY, 3MF or STEP whose name ends so"
+            )
     if not len(corners):
         raise MeshFileError("an STL file with triangles; here are none")
     nowhere = ~np.isfinite(corners).all(axis=(1, 2))
@@ -67,7 +72,7 @@ def _corners_in(text: bytes) -> Array:
     """Corners of the facets of a text, (nt, 3, 3) float64."""
     starts = [found.end() for found in _FACET.finditer(text)]
     numbers: list[float] = []
-    for start, end in zip(starts, [*starts[1:], len(text)], strict=True):
+    for start, end in pairwise([*starts, len(text)]):
         corners = _CORNER.findall(text, start, end)
         if len(corners) != 3:
             ends = ", and the file ends there" if end == len(text) and len(corners) < 3 else ""

@@ -17,7 +17,7 @@ from sandmould.scenario.checks.wall_thickness import thinnest_wall
 from sandmould.scenario.hardness import LEAST_KAPPA, bed_hardness
 from sandmould.scenario.pattern import PatternDrawing
 from sandmould.scenario.scenario import Scenario
-from sandmould.scenario.solids import SolidMesh, drawn_part
+from sandmould.scenario.solids import SolidMesh, drawn_part, drawn_surface
 
 HIGH_ACCELERATION_G = 20.0
 """Peak acceleration above which a plan asks whether the amplitude is meant so."""
@@ -30,7 +30,9 @@ def notes(scenario: Scenario) -> tuple[Note, ...]:
     """How stiff the grains are, spaces and walls thinner than they allow, and drawings."""
     smallest_m = scenario.sand.classes(scenario.dimension)[0].diameter_m
     solids: list[Outline | TriangleMesh] = [*scenario.scene.outlines, *scenario.scene.meshes]
-    walls = {solid.name: thinnest_wall([solid], smallest_m) for solid in solids}
+    walls = {
+        solid.name: thinnest_wall([_as_drawn(scenario, solid)], smallest_m) for solid in solids
+    }
     box_m = np.array(scenario.box.size_m(scenario.dimension))
     places = {"obstacles": scenario.obstacles, "cavities": scenario.cavities}
     drawn = {
@@ -56,6 +58,17 @@ def notes(scenario: Scenario) -> tuple[Note, ...]:
         drawings=drawn,
         **_of_pattern(scenario),
     )
+
+
+def _as_drawn(scenario: Scenario, solid: Outline | TriangleMesh) -> Outline | TriangleMesh:
+    """A solid, a drawn pattern by its drawing: its elements cut corners."""
+    pattern = scenario.pattern
+    if pattern is None or solid.name != pattern.name:
+        return solid
+    if not isinstance(pattern.shape, PatternDrawing):
+        return solid
+    drawn_m, triangles = drawn_surface(pattern.shape, "pattern.shape")
+    return TriangleMesh(solid.name, drawn_m + np.array(pattern.position_m), triangles)
 
 
 def _of_pattern(scenario: Scenario) -> dict[str, Any]:

@@ -209,9 +209,10 @@ def test_a_shell_that_is_no_cavity_is_told(tmp_path: Path) -> None:
     mesh = {"kind": "mesh", "file": "parts.stl", "unit_m": 0.001}
     room = {"low_m": [0.0, 0.0, 0.0], "high_m": [0.028, 0.028, 0.028]}
     notes = notes_of(tmp_path, shapes=[mesh], box=room, probes=[], element_m=0.002)
-    assert any(
-        note.startswith("Drawing shapes.0: shapes.0 has 1 shell that lies in another one")
-        for note in notes
+    (told,) = [note for note in notes if note.startswith("Drawing shapes.0: ")]
+    assert told.endswith(
+        " cm3 in 12 triangles. 1 shell lies in another one with faces outwards, and is part of the "
+        "solid there. A cavity faces inwards."
     )
 
 
