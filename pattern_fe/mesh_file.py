@@ -99,8 +99,8 @@ def _parsed(path: Path) -> meshio.Mesh:
         with hushed[0], hushed[1], np.errstate(over="ignore"), _all_saved():
             return meshio.read(path, file_format=known)
     except (Exception, SystemExit) as error:
-        said = " ".join(f"{error} {printed.getvalue()}".split())
-        reason = said if isinstance(error, Exception) and said else "not readable"
+        told = error if isinstance(error, Exception) else ""
+        reason = " ".join(f"{printed.getvalue()} {told}".split()) or "not readable"
         valid = "a mesh that meshio reads, such as .msh of Gmsh, .vtu or .inp"
         raise ValueError(f"mesh file {path} cannot be read ({reason}), valid is {valid}") from error
 
