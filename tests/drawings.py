@@ -163,7 +163,7 @@ REFUSED: dict[str, tuple[Callable[[Body], bytes], str]] = {
     ),
     "nowhere": (
         lambda body: text(body).replace("vertex ", "vertex nan ", 1).encode(),
-        r"finite numbers; triangle \d+ of \d+ has another",
+        r"finite numbers below 1e\+30; triangle \d+ of \d+ has another",
     ),
 }
 

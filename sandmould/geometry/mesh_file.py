@@ -12,7 +12,13 @@ from scipy.sparse import coo_array
 from scipy.sparse.csgraph import connected_components
 from scipy.spatial import cKDTree
 
-from sandmould.geometry.drawing_file import MeshFileError, file_hash, is_step, tells_unit
+from sandmould.geometry.drawing_file import (
+    MeshFileError,
+    check_numbers,
+    file_hash,
+    is_step,
+    tells_unit,
+)
 from sandmould.geometry.mesh import TriangleMesh, signed_volumes_m3
 from sandmould.geometry.mesh_coarser import MANY, WITHIN, coarser
 from sandmould.geometry.mesh_crossing import check_crossings
@@ -172,10 +178,7 @@ def _by_trimesh(path: Path) -> tuple[Array, Triangles]:
         raise MeshFileError("a file with triangles; here are none")
     if not 0 <= cells.min() <= cells.max() < len(points):
         raise MeshFileError(f"triangles between its {len(points)} vertices")
-    nowhere = ~np.isfinite(points).all(axis=1)
-    if nowhere.any():
-        place = f"vertex {int(nowhere.argmax()) + 1} of {len(points)} has another"
-        raise MeshFileError(f"vertices that are finite numbers; {place}")
+    check_numbers(points, "vertex")
     return points, cells
 
 

@@ -67,7 +67,7 @@ def mended(vertices: Array, triangles: Ints) -> Mended:
     Raises
     ------
     MeshFileError
-        When the holes are too large to be closed.
+        When the holes are too large to be closed, or nothing is left.
     """
     kept = _without_needless(vertices, triangles, lone=False)
     dropped = len(triangles) - len(kept)
@@ -79,6 +79,8 @@ def mended(vertices: Array, triangles: Ints) -> Mended:
         dropped += len(kept) - len(closer)
         kept = _split_at_points(vertices, closer, near)
         joined += len(kept) - len(closer)
+    if not len(kept):
+        raise MeshFileError("triangles with an area; here are none")
     turn = _turned(kept)
     faced = np.where(turn[:, None], kept[:, ::-1], kept)
     loops = _rims(faced)
@@ -221,7 +223,7 @@ def _patches(vertices: Array, triangles: Ints, rims: list[list[int]]) -> tuple[I
     sides = sides_of(triangles)
     corners = vertices[triangles]
     normal = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
-    length = np.linalg.norm(normal, axis=1)
+    length = np.maximum(np.linalg.norm(normal, axis=1), np.finfo(np.float64).tiny)
     new: list[tuple[int, ...]] = []
     area = unknown = unframed = 0.0
     for rim in rims:
@@ -251,9 +253,9 @@ def _patches(vertices: Array, triangles: Ints, rims: list[list[int]]) -> tuple[I
 
 def _filled(place: Array, normal: Array) -> list[tuple[int, int, int]]:
     """Triangles in a flat outline, counter-clockwise seen against its normal."""
-    first = place[1] - place[0] - (place[1] - place[0]) @ normal * normal
-    axes = np.stack([first, np.cross(normal, first)]) / np.linalg.norm(first)
-    flat = place @ axes.T
+    level = place - np.outer(place @ normal, normal)
+    first = level[np.linalg.norm(level, axis=1).argmax()]
+    flat = level @ np.stack([first, np.cross(normal, first)]).T / np.linalg.norm(first)
     n = len(flat)
     if outline_fault(flat):
         return []

@@ -9,7 +9,7 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from sandmould.geometry.drawing_file import MeshFileError
+from sandmould.geometry.drawing_file import MeshFileError, check_numbers
 
 Array = NDArray[np.float64]
 _HEAD, _TRIANGLE = 84, np.dtype([("normal", "<f4", 3), ("corner", "<f4", (3, 3)), ("color", "<u2")])
@@ -44,7 +44,8 @@ def read_stl(path: Path) -> Array:
     there = max(len(content) - _HEAD, 0) // _TRIANGLE.itemsize
     is_text = b"\0" not in content[:_HEAD]
     if not is_text and 0 < number <= there:
-        corners = np.frombuffer(content, _TRIANGLE, number, _HEAD)["corner"].astype(np.float64)
+        with np.errstate(invalid="ignore"):  # what is no number is told below
+            corners = np.frombuffer(content, _TRIANGLE, number, _HEAD)["corner"].astype(np.float64)
     else:
         for start, what in _OTHERS.items():
             if content.startswith(start):
@@ -61,10 +62,7 @@ def read_stl(path: Path) -> Array:
             )
     if not len(corners):
         raise MeshFileError("an STL file with triangles; here are none")
-    nowhere = ~np.isfinite(corners).all(axis=(1, 2))
-    if nowhere.any():
-        place = f"triangle {int(nowhere.argmax()) + 1} of {len(corners)} has another"
-        raise MeshFileError(f"vertices that are finite numbers; {place}")
+    check_numbers(corners, "triangle")
     return corners
 
 

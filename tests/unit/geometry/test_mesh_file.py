@@ -82,7 +82,7 @@ FAULTS: dict[str, tuple[np.ndarray, np.ndarray, str]] = {
         np.concatenate([FACETS, [[0, 3, 8], [0, 8, 4]]]),
         "a closed surface; 2 edges belong to one triangle only, one at (",
     ),
-    "not finite": (NOWHERE, FACETS, "vertices that are finite numbers"),
+    "not finite": (NOWHERE, FACETS, "vertices that are finite numbers below 1e+30; triangle 1 of"),
     "empty": (CORNERS, FACETS[:0], "an STL file with triangles; here are none"),
 }
 
