@@ -5,11 +5,13 @@ from __future__ import annotations
 import contextlib
 import io
 import logging
+from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
 
 import meshio
 import numpy as np
+from meshio.gmsh import _gmsh41
 from numpy.typing import NDArray
 from skfem import MeshHex1, MeshQuad1, MeshTet1, MeshTri1
 from skfem.io.meshio import from_meshio
@@ -94,12 +96,33 @@ def _parsed(path: Path) -> meshio.Mesh:
         # meshio prints and ends the process at a file that it cannot read; of a text file it takes
         # some bytes for a number of triangles, which may overflow
         hushed = contextlib.redirect_stdout(printed), contextlib.redirect_stderr(printed)
-        with hushed[0], hushed[1], np.errstate(over="ignore"):
+        with hushed[0], hushed[1], np.errstate(over="ignore"), _all_saved():
             return meshio.read(path, file_format=known)
     except (Exception, SystemExit) as error:
-        reason = str(error) if isinstance(error, meshio.ReadError | OSError) else "not readable"
+        told = error if isinstance(error, Exception) else ""
+        reason = " ".join(f"{printed.getvalue()} {told}".split()) or "not readable"
         valid = "a mesh that meshio reads, such as .msh of Gmsh, .vtu or .inp"
         raise ValueError(f"mesh file {path} cannot be read ({reason}), valid is {valid}") from error
+
+
+@contextlib.contextmanager
+def _all_saved() -> Iterator[None]:
+    """Let meshio read files of Gmsh 4.1 whose groups do not hold all elements (Mesh.SaveAll).
+
+    It gives the numbers of groups for the elements in groups alone, and then refuses them as too
+    few. Groups are found by their names, so that the numbers can go.
+    """
+    given = _gmsh41.Mesh
+
+    def fitting(points: Any, cells: Any, *, cell_data: dict[str, Any], **others: Any) -> Any:
+        whole = {name: rows for name, rows in cell_data.items() if len(rows) == len(cells)}
+        return given(points, cells, cell_data=whole, **others)
+
+    _gmsh41.Mesh = fitting
+    try:
+        yield
+    finally:
+        _gmsh41.Mesh = given
 
 
 def _with_groups(content: meshio.Mesh) -> Any:

@@ -90,7 +90,9 @@ def _computed(
     config: PatternConfig, size_m: tuple[float, ...], thickness_m: float | None, changed_ns: int
 ) -> Pattern:
     """The pattern of a section in a box; its matrices stay with it."""
-    with _blaming("pattern.shape", config.shape.model_dump(mode="json")):
+    shape = config.shape
+    named = shape.file if isinstance(shape, MeshFile | PatternDrawing) else shape.model_dump()
+    with _blaming("pattern.shape", named):
         mesh = _mesh(config, size_m).translated(np.array(config.position_m))
     with _blaming("pattern.position_m", list(config.position_m)):
         check_inside(mesh.p.T, np.zeros(len(size_m)), np.array(size_m))
@@ -143,7 +145,7 @@ def _mesh(config: PatternConfig, size_m: tuple[float, ...]) -> Any:
         vertices_m, triangles = drawn_surface(shape, "pattern.shape")
         # before it is meshed: in the wrong unit it would have millions of elements
         box_m = np.array(size_m)
-        hint = unit_hint(np.ptp(vertices_m, axis=0), box_m, shape.unit_m)
+        hint = unit_hint(shape, np.ptp(vertices_m, axis=0), box_m)
         with _blaming("pattern.position_m", list(config.position_m)):
             check_inside(vertices_m + np.array(config.position_m), np.zeros(3), box_m, hint)
         return drawing_mesh(shape, TriangleMesh("drawing", vertices_m, triangles), config.element_m)

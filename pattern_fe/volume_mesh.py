@@ -8,8 +8,9 @@ import numpy as np
 from numpy.typing import NDArray
 from skfem import MeshTet
 
+from sandmould.geometry.drawing_file import is_step
 from sandmould.geometry.mesh import TriangleMesh
-from sandmould.geometry.mesher import is_step, step_tetrahedra, surface_tetrahedra
+from sandmould.geometry.mesher import step_tetrahedra, surface_tetrahedra
 from sandmould.limits import SOLID_ELEMENTS
 from sandmould.pattern_fe.shapes import with_sides
 from sandmould.scenario.pattern import PatternDrawing

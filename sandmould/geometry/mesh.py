@@ -95,6 +95,12 @@ class TriangleMesh:
         """Volume, m3."""
         return float(signed_volumes_m3(self.vertices_m, self.triangles).sum())
 
+    @property
+    def surface_m2(self) -> float:
+        """Area of its surface, m2."""
+        a, b, c = self.corners_m.transpose(1, 0, 2)
+        return float(0.5 * np.linalg.norm(np.cross(b - a, c - a), axis=1).sum())
+
     def section_m(self, axis: int, place_m: float) -> list[Array]:
         """Closed outlines in which a plane across a coordinate axis cuts the solid.
 

@@ -48,7 +48,7 @@ def cut(vertices: Array, triangles: Ints, shell: Ints, near: float) -> CutShells
     pairs = _meeting(vertices, triangles, shell, near)
     if not len(pairs):
         return CutShells(vertices, triangles, shell)
-    points = _with(vertices, _crossings(vertices, triangles, pairs, near), near)
+    points = _with(vertices, crossings(vertices, triangles, pairs, near), near)
     for _ in range(_MOST_ROUNDS):
         scene = _Lines(points, triangles, pairs, 2.0 * near)
         more = scene.crossings()
@@ -79,7 +79,7 @@ def _meeting(vertices: Array, triangles: Ints, shell: Ints, near: float) -> Ints
     return np.stack([i[meet], j[meet]], axis=1)
 
 
-def _crossings(vertices: Array, triangles: Ints, pairs: Ints, near: float) -> Array:
+def crossings(vertices: Array, triangles: Ints, pairs: Ints, near: float) -> Array:
     """Points in which edges of one triangle pass another or its edges, (k, 3) float64."""
     found = []
     for turn in (False, True):

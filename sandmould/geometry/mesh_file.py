@@ -1,4 +1,4 @@
-"""Closed surfaces from STL and STEP files, checked before they stand in a scene."""
+"""Closed surfaces from drawings, mended and checked before they stand in a scene."""
 
 from __future__ import annotations
 
@@ -12,90 +12,111 @@ from scipy.sparse import coo_array
 from scipy.sparse.csgraph import connected_components
 from scipy.spatial import cKDTree
 
-from sandmould.geometry.drawing_file import MeshFileError, file_hash
-from sandmould.geometry.mesh import signed_volumes_m3
+from sandmould.geometry.drawing_file import (
+    MeshFileError,
+    check_numbers,
+    file_hash,
+    is_step,
+    tells_unit,
+)
+from sandmould.geometry.mesh import TriangleMesh, signed_volumes_m3
+from sandmould.geometry.mesh_coarser import MANY, WITHIN, coarser
 from sandmould.geometry.mesh_crossing import check_crossings
+from sandmould.geometry.mesh_repair import Mended, mended
 from sandmould.geometry.mesh_shells import (
     SAME,
     at,
     extent,
     facing,
+    flat_triangles,
     joined_sides,
     shells_of,
     with_own_vertices,
 )
 from sandmould.geometry.mesh_union import united
-from sandmould.geometry.mesher import is_step, step_surface
+from sandmould.geometry.mesher import step_surface
+from sandmould.geometry.stl_file import read_stl
 from sandmould.limits import TRIANGLES
 
 Array = NDArray[np.float64]
 Triangles = NDArray[np.int64]
 
 
-class Repairs(NamedTuple):
-    """What was changed in a drawing, or may have been meant otherwise."""
+OTHERS = (".obj", ".ply", ".3mf")
+"""Endings of files that trimesh reads; those that are not here nor of STEP are STL."""
+MOST_UNKNOWN = 0.01
+"""Share of the volume that closed holes may leave unknown."""
 
+
+class Reading(NamedTuple):
+    """A surface as it is computed with, and what was changed in its drawing."""
+
+    vertices: Array
+    """(nv, 3) float64: in the file's unit; metres where the file tells its unit."""
+    triangles: Triangles
+    """(nt, 3) int64: the surface of the union alone, nothing inside it is left."""
+    mended: Mended
     filled_shells: int
     """Shells that change nothing: they lie in another and face outwards."""
     turned_triangles: int
     """Triangles that were drawn inside out."""
+    as_drawn: TriangleMesh
+    """The file's triangles as they are."""
+    whole: TriangleMesh
+    """The surface before triangles were merged."""
+    within: float
+    """How far those that were merged may lie off it."""
 
 
 def read_surface(path: Path) -> tuple[Array, Triangles]:
-    """Read an STL file, ASCII or binary, or a STEP file as a closed surface seen from outside.
+    """Vertices and triangles of a drawing: the first two of :func:`read_drawing`."""
+    return read_drawing(path)[:2]
+
+
+def read_drawing(path: Path) -> Reading:
+    """Read an STL, OBJ, PLY, 3MF or STEP file as a closed surface seen from outside.
 
     Vertices are merged within a millionth of the extent. Inside is where the winding number of all
     shells is above 1/2: shells that touch or overlap are one solid, and one that faces inwards
     takes away from the solid round it. A shell that faces inwards with no solid round it was drawn
-    inside out and is turned.
-
-    Returns
-    -------
-    vertices : (nv, 3) float64
-        In the file's unit; metres of a STEP file.
-    triangles : (nt, 3) int64
-        The surface of the union alone: nothing inside it is left.
+    inside out and is turned. Faults with one cure are mended, and very many triangles merged.
 
     Raises
     ------
     MeshFileError
         When the file is missing or of another kind, or its triangles bound no solid.
     """
-    return _read(path, file_hash(path))[:2]
-
-
-def repairs(path: Path) -> Repairs:
-    """What :func:`read_surface` changed in a file, and what it left as it is.
-
-    Raises
-    ------
-    MeshFileError
-        As :func:`read_surface`.
-    """
-    return _read(path, file_hash(path))[2]
+    return _read(path, file_hash(path))
 
 
 @lru_cache(maxsize=8)
-def _read(path: Path, sha256: str) -> tuple[Array, Triangles, Repairs]:
+def _read(path: Path, sha256: str) -> Reading:
     """Read a file once for each state of it: a sweep asks for the same one at every point."""
-    points, cells = step_surface(path) if is_step(path) else _parsed(path)
+    points, cells = _parsed(path)
     if len(cells) > TRIANGLES.most:
         raise MeshFileError(f"a file {TRIANGLES.sentence(len(cells))}")
     vertices, triangles = _merged(points, cells)
-    _check_triangles(vertices, triangles)
-    # from the lowest vertex on: shells that touch may have one triangle in both ways
-    start = triangles.argmin(axis=1)[:, None]
-    way = np.take_along_axis(triangles, (start + np.arange(3)) % 3, axis=1)
-    _check_doubles(vertices, triangles, way)
-    joined = joined_sides(vertices, triangles)
-    shell = shells_of(joined, len(triangles))
-    _check_doubles(vertices, triangles, np.column_stack([np.sort(triangles, axis=1), shell]))
-    faced, filled = facing(vertices, triangles, shell)
-    check_crossings(vertices, faced, shell)
-    done = Repairs(len(filled), int((faced != triangles).any(axis=1).sum()))
+    whole = mended(vertices, triangles)
+    joined = joined_sides(vertices, whole.triangles)
+    shell = shells_of(joined, len(whole.triangles))
+    check_crossings(vertices, whole.triangles, shell)
+    faced, filled = facing(vertices, whole.triangles, shell)
     if shell.any():
-        return *united(vertices, faced, shell), done
-    return *with_own_vertices(vertices, faced, joined_sides(vertices, faced)), done
+        solid = TriangleMesh("drawn", *united(vertices, faced, shell))
+    else:
+        own = with_own_vertices(vertices, faced, joined_sides(vertices, faced))
+        solid = TriangleMesh("drawn", *own)
+    if whole.unknown_volume > MOST_UNKNOWN * solid.measure:
+        raise MeshFileError(
+            f"a closed surface; the holes of this one leave "
+            f"{whole.unknown_volume / solid.measure:.1%} of its volume unknown, and up to "
+            f"{MOST_UNKNOWN:.0%} is closed here: close them in the program that drew it"
+        )
+    coarse = coarser(solid) if len(solid.triangles) > MANY else solid
+    turned = int((faced != whole.as_drawn).any(axis=1).sum())
+    parts = coarse.vertices_m, coarse.triangles
+    as_drawn = TriangleMesh("drawn", vertices, triangles)
+    return Reading(*parts, whole, len(filled), turned, as_drawn, solid, WITHIN * extent(vertices))
 
 
 def check_surface(vertices: Array, triangles: Triangles) -> None:
@@ -112,31 +133,53 @@ def check_surface(vertices: Array, triangles: Triangles) -> None:
     """
     if triangles.min() < 0 or triangles.max() >= len(vertices):
         raise MeshFileError(f"triangles between its {len(vertices)} vertices, counted from 0")
-    _check_triangles(vertices, triangles)
-    _check_doubles(vertices, triangles, np.sort(triangles, axis=1))
+    flat = flat_triangles(vertices, triangles)
+    _refuse(flat, "triangles with an area", "degenerate", vertices, triangles)
+    _, index, count = np.unique(
+        np.sort(triangles, axis=1), axis=0, return_index=True, return_counts=True
+    )
+    doubles = np.isin(np.arange(len(triangles)), index[count > 1])
+    _refuse(doubles, "triangles that differ", "given more than once", vertices, triangles)
     joined_sides(vertices, triangles, most=2)
     if not signed_volumes_m3(vertices, triangles).sum() > 0.0:
         raise MeshFileError("triangles that run counter-clockwise seen from outside")
 
 
 def _parsed(path: Path) -> tuple[Array, Triangles]:
-    # slow to import, and few scenes have meshes
-    import meshio
+    """Each place once, in the order in which the file tells them, and the triangles."""
+    if is_step(path):
+        return step_surface(path)
+    if path.suffix.lower() in OTHERS:
+        return _by_trimesh(path)
+    try:
+        points = read_stl(path).reshape(-1, 3)
+    except OSError as error:
+        raise MeshFileError(f"a readable file ({error.strerror})") from error
+    _, first, number = np.unique(points, axis=0, return_index=True, return_inverse=True)
+    order = np.argsort(first)
+    return points[first[order]], np.argsort(order)[number.ravel()].reshape(-1, 3)
+
+
+def _by_trimesh(path: Path) -> tuple[Array, Triangles]:
+    import trimesh  # takes a while, and few drawings need it
 
     try:
-        # not meshio.read, which ends the process at a file that it cannot read; of a text file it
-        # takes some bytes for a number of triangles, which may overflow
-        with np.errstate(over="ignore"):
-            mesh = meshio.stl.read(str(path))
-        cells = mesh.cells_dict.get("triangle", np.empty((0, 3)))
-        points = np.asarray(mesh.points, dtype=np.float64).reshape(-1, 3)
-    except (meshio.ReadError, OSError, ValueError, IndexError, TypeError, MemoryError) as error:
-        raise MeshFileError("an STL file, ASCII or binary") from error
-    if len(cells) == 0:
-        raise MeshFileError("an STL file with triangles; here are none")
-    if not np.isfinite(points).all():
-        raise MeshFileError("vertices that are finite numbers")
-    return points, np.asarray(cells, dtype=np.int64)
+        scene = trimesh.load_scene(path, process=False)
+        told = tells_unit(path)
+        unit_m = trimesh.units.unit_conversion(scene.units, "meters") if told else 1.0
+        mesh = scene.to_mesh()
+        points = unit_m * np.asarray(mesh.vertices, dtype=np.float64).reshape(-1, 3)
+        cells = np.asarray(mesh.faces, dtype=np.int64).reshape(-1, 3)
+    except Exception as error:  # of each format its own
+        kind = path.suffix[1:].upper()
+        reason = " ".join(str(error).split()) or type(error).__name__
+        raise MeshFileError(f"a {kind} file that trimesh reads; it says: {reason}") from error
+    if not len(cells):
+        raise MeshFileError("a file with triangles; here are none")
+    if not 0 <= cells.min() <= cells.max() < len(points):
+        raise MeshFileError(f"triangles between its {len(points)} vertices")
+    check_numbers(points, "vertex")
+    return points, cells
 
 
 def _merged(points: Array, triangles: Triangles) -> tuple[Array, Triangles]:
@@ -150,27 +193,10 @@ def _merged(points: Array, triangles: Triangles) -> tuple[Array, Triangles]:
     return points[first], group[triangles].astype(np.int64)
 
 
-def _check_triangles(vertices: Array, triangles: Triangles) -> None:
-    a, b, c = vertices[triangles].transpose(1, 0, 2)
-    area2 = np.linalg.norm(np.cross(b - a, c - a), axis=1)
-    longest = np.max([np.linalg.norm(e, axis=1) for e in (b - a, c - b, a - c)], axis=0)
-    flat = area2 <= SAME * extent(vertices) * longest
-    if flat.any():
-        raise MeshFileError(
-            f"triangles with an area; {_counted(flat, 'triangle')} degenerate, "
-            f"{at(vertices[triangles[flat][0]].mean(axis=0))}"
-        )
-
-
-def _check_doubles(vertices: Array, triangles: Triangles, rows: Triangles) -> None:
-    """Refuse triangles whose rows are equal."""
-    _, index, count = np.unique(rows, axis=0, return_index=True, return_counts=True)
-    if (count > 1).any():
-        raise MeshFileError(
-            f"triangles that differ; {_counted(count > 1, 'triangle')} given more than once, "
-            f"{at(vertices[triangles[index[count > 1][0]]].mean(axis=0))}"
-        )
-
-
-def _counted(bad: NDArray[np.bool_], what: str) -> str:
-    return f"{bad.sum()} {what}s are" if bad.sum() > 1 else f"1 {what} is"
+def _refuse(
+    bad: NDArray[np.bool_], valid: str, what: str, vertices: Array, triangles: Triangles
+) -> None:
+    if bad.any():
+        number = f"{bad.sum()} triangles are" if bad.sum() > 1 else "1 triangle is"
+        place = at(vertices[triangles[bad][0]].mean(axis=0))
+        raise MeshFileError(f"{valid}; {number} {what}, {place}")

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -41,6 +42,47 @@ def at(place: Array) -> str:
     return "one at ({}) in the file's unit".format(", ".join(f"{x:.4g}" for x in place))
 
 
+class Sides(NamedTuple):
+    """Sides of triangles, ``3 t + k`` from corner ``k`` of triangle ``t`` to the next."""
+
+    ends: Ints
+    """(3 nt, 2) int64."""
+    up: NDArray[np.bool_]
+    """(3 nt,) bool: whether each goes from the lower vertex to the higher."""
+    edges: Ints
+    """(ne, 2) int64: every edge once, in order."""
+    edge: Ints
+    """(nt, 3) int64: the edge of each side."""
+    shared: Ints
+    """(ne,) int64: triangles at each edge."""
+
+
+def sides_of(triangles: Ints) -> Sides:
+    """Sides of triangles and the edges that they share."""
+    ends = np.stack([triangles, np.roll(triangles, -1, axis=1)], axis=2).reshape(-1, 2)
+    low, high = ends.min(axis=1), ends.max(axis=1)
+    # one number an edge: far quicker to sort than two
+    n = int(triangles.max(initial=0)) + 1
+    code, edge, count = np.unique(low * n + high, return_inverse=True, return_counts=True)
+    edges = np.stack([code // n, code % n], axis=1)
+    return Sides(ends, ends[:, 0] < ends[:, 1], edges, edge.reshape(-1, 3), count)
+
+
+def meeting_sides(sides: Sides) -> Ints:
+    """Pairs of sides at edges of two triangles, (m, 2) int64, in order of the edges."""
+    at_edge = np.argsort(sides.edge.ravel(), kind="stable")
+    first = (np.cumsum(sides.shared) - sides.shared)[sides.shared == 2]
+    return np.stack([at_edge[first], at_edge[first + 1]], axis=1)
+
+
+def flat_triangles(vertices: Array, triangles: Ints) -> NDArray[np.bool_]:
+    """Which triangles have no area: they are narrower than round-off of the file."""
+    a, b, c = vertices[triangles].transpose(1, 0, 2)
+    area2 = np.linalg.norm(np.cross(b - a, c - a), axis=1)
+    longest = np.max([np.linalg.norm(e, axis=1) for e in (b - a, c - b, a - c)], axis=0)
+    return np.asarray(area2 <= SAME * extent(vertices) * longest)
+
+
 def joined_sides(vertices: Array, triangles: Ints, most: int | None = None) -> Ints:
     """Pairs of sides of triangles that make one edge, in opposite ways.
 
@@ -64,16 +106,12 @@ def joined_sides(vertices: Array, triangles: Ints, most: int | None = None) -> I
     MeshFileError
         When the surface is open or its triangles do not face one way.
     """
-    ends = np.stack([triangles, np.roll(triangles, -1, axis=1)], axis=2).reshape(-1, 2)
-    edges, inverse, count = np.unique(
-        np.sort(ends, axis=1), axis=0, return_inverse=True, return_counts=True
-    )
-    inverse = inverse.ravel()
-    up = ends[:, 0] < ends[:, 1]
-    way = np.bincount(inverse, weights=np.where(up, 1.0, -1.0))
+    sides = sides_of(triangles)
+    edges, count = sides.edges, sides.shared
+    way = np.bincount(sides.edge.ravel(), weights=np.where(sides.up, 1.0, -1.0))
     faults = (
         (count == 1, "a closed surface", "belong to one triangle only", "belongs"),
-        (count > (most or len(ends)), "edges of two triangles", "belong to more", "belongs"),
+        (count > (most or len(sides.ends)), "edges of two triangles", "belong to more", "belongs"),
         ((way != 0.0) & (count > 2) & (count % 2 == 1), "a closed surface",
          "belong to an odd number of triangles", "belongs"),
         (way != 0.0, "triangles that all face one way", "lie between two that do not", "lies"),
@@ -85,13 +123,13 @@ def joined_sides(vertices: Array, triangles: Ints, most: int | None = None) -> I
             raise MeshFileError(
                 f"{valid}; {number} {words}, {at(vertices[edges[bad][0]].mean(axis=0))}"
             )
-    order = np.argsort(inverse, kind="stable")
-    first = np.concatenate([[0], np.cumsum(count)])
-    simple = first[:-1][count == 2]
-    pairs = [np.stack([order[simple], order[simple + 1]], axis=1)]
-    for edge in np.flatnonzero(count > 2):
-        sides = order[first[edge] : first[edge + 1]]
-        pairs.append(_round_an_edge(vertices, triangles, edges[edge], sides, up))
+    pairs = [meeting_sides(sides)]
+    if (count > 2).any():
+        order = np.argsort(sides.edge.ravel(), kind="stable")
+        first = np.concatenate([[0], np.cumsum(count)])
+        for edge in np.flatnonzero(count > 2):
+            own = order[first[edge] : first[edge + 1]]
+            pairs.append(_round_an_edge(vertices, triangles, edges[edge], own, sides.up))
     return np.concatenate(pairs)
 
 
@@ -130,10 +168,19 @@ def _round_an_edge(
 
 
 def shells_of(joined: Ints, count: int) -> Ints:
-    """Number of the connected shell of each of some triangles, (count,) int64."""
+    """Number of the connected shell of each of some triangles, (count,) int64.
+
+    Raises
+    ------
+    MeshFileError
+        When there are too many.
+    """
     beside = joined // 3
     links = coo_array((np.ones(len(beside)), (beside[:, 0], beside[:, 1])), shape=(count, count))
-    return np.asarray(connected_components(links, directed=False)[1], dtype=np.int64)
+    number, shell = connected_components(links, directed=False)
+    if number > MOST_SHELLS:
+        raise MeshFileError(f"at most {MOST_SHELLS} shells in one file; here are {number}")
+    return np.asarray(shell, dtype=np.int64)
 
 
 def with_own_vertices(vertices: Array, triangles: Ints, joined: Ints) -> tuple[Array, Ints]:
@@ -173,8 +220,6 @@ def facing(vertices: Array, triangles: Ints, shell: Ints) -> tuple[Ints, Sequenc
         When a shell encloses nothing, or one that faces inwards sticks out of the solid round it.
     """
     count = int(shell.max()) + 1
-    if count > MOST_SHELLS:
-        raise MeshFileError(f"at most {MOST_SHELLS} shells in one file; here are {count}")
     volume = np.bincount(shell, weights=signed_volumes_m3(vertices, triangles), minlength=count)
     for number in range(count):
         own = vertices[triangles[shell == number].ravel()]

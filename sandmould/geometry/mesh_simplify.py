@@ -67,7 +67,7 @@ class _Surface:
         """Move a vertex into the best neighbour; False where none will do."""
         own = sorted(self.round[v])
         corners = self.place[np.array([self.triangles[t] for t in own])]
-        normals, least = _shapes(corners)
+        normals, least = shapes(corners)
         faces: list[Array] = []
         for n in normals:
             if not any(n @ f > 0.0 and np.linalg.norm(np.cross(n, f)) < _ONE_PLANE for f in faces):
@@ -107,8 +107,8 @@ class _Surface:
         corners = self.place[
             np.array([[u if w == v else w for w in self.triangles[t]] for t in others])
         ]
-        before, _ = _shapes(self.place[np.array([self.triangles[t] for t in others])])
-        after, least = _shapes(corners)
+        before, _ = shapes(self.place[np.array([self.triangles[t] for t in others])])
+        after, least = shapes(corners)
         turned = np.sum(before * after, axis=1) < np.sqrt(1.0 - _ONE_PLANE**2)
         return 0.0 if turned.any() else float(least.min())
 
@@ -116,7 +116,7 @@ class _Surface:
         return {w for t in self.round[v] for w in self.triangles[t]} - {v}
 
 
-def _shapes(corners: Array) -> tuple[Array, Array]:
+def shapes(corners: Array) -> tuple[Array, Array]:
     """Unit normals of triangles, (n, 3), and the sine of the least angle of each, (n,)."""
     a, b, c = corners.transpose(1, 0, 2)
     normal = np.cross(b - a, c - a)

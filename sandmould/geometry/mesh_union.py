@@ -20,6 +20,8 @@ from sandmould.geometry.mesh_shells import (
     SAME,
     extent,
     joined_sides,
+    meeting_sides,
+    sides_of,
     with_own_vertices,
 )
 from sandmould.geometry.mesh_simplify import simplified
@@ -110,13 +112,7 @@ def _bounds(pieces: CutShells, search: MeshSearch, shell: Ints, beside: float) -
 
 def _patches(triangles: Ints) -> Ints:
     """Number of the patch of each triangle: joined over edges of two triangles."""
-    ends = np.stack([triangles, np.roll(triangles, -1, axis=1)], axis=2).reshape(-1, 2)
-    _, inverse, count = np.unique(
-        np.sort(ends, axis=1), axis=0, return_inverse=True, return_counts=True
-    )
-    order = np.argsort(inverse.ravel(), kind="stable")
-    first = np.concatenate([[0], np.cumsum(count)])[:-1][count == 2]
-    a, b = order[first] // 3, order[first + 1] // 3
+    a, b = (meeting_sides(sides_of(triangles)) // 3).T
     n = len(triangles)
     links = coo_array((np.ones(len(a)), (a, b)), shape=(n, n))
     return np.asarray(connected_components(links, directed=False)[1], dtype=np.int64)

@@ -131,7 +131,7 @@ def _mesh(gmsh: Any, size_m: float, result: Path) -> None:
     mesh = gmsh.model.mesh
     mesh.generate(3 if solid else 2)
     tags, points, _ = mesh.getNodes()
-    _, corners = mesh.getElementsByType(_TETRAHEDRON if solid else _TRIANGLE)
+    elements, corners = mesh.getElementsByType(_TETRAHEDRON if solid else _TRIANGLE)
     if not len(corners):
         raise ValueError("it found no volume in the surface")
     used, cells = np.unique(corners, return_inverse=True)
@@ -139,7 +139,8 @@ def _mesh(gmsh: Any, size_m: float, result: Path) -> None:
     place[tags.astype(np.int64)] = np.arange(len(tags))
     points_m = points.reshape(-1, 3)[place[used.astype(np.int64)]]
     cells = cells.reshape(-1, 4 if solid else 3).astype(np.int64)
-    np.savez(result, points_m=points_m, cells=cells)
+    worst = np.min(mesh.getElementQualities(elements, "gamma"))
+    np.savez(result, points_m=points_m, cells=cells, worst=worst)
 
 
 if __name__ == "__main__":

@@ -14,7 +14,7 @@ import numpy as np
 from sandmould import SHIPPED
 from sandmould.bad_input import BadInputError, Problem
 from sandmould.engines.deck import environment
-from sandmould.geometry.drawing_file import MeshFileError
+from sandmould.geometry.drawing_file import MeshFileError, tells_unit
 from sandmould.study.plan.build_plan import Plan, open_plan
 
 _HELD = ("acceleration_g", "velocity_mm_s", "amplitude_mm", "unbalance")
@@ -123,9 +123,9 @@ def _flag(option: str) -> str:
 
 def _placed(drawing: Path) -> dict[str, Any]:
     """Box, elements and gating for a part, or its mould."""
-    from sandmould.geometry.mesh_file import is_step, read_surface  # slow to import
+    from sandmould.geometry.mesh_file import read_surface  # slow to import
 
-    unit_m = 1.0 if is_step(drawing) else 0.001
+    unit_m = 1.0 if tells_unit(drawing) else 0.001
     try:
         vertices, triangles = read_surface(drawing)
     except MeshFileError as fault:

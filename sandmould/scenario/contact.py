@@ -105,7 +105,7 @@ class Contact(Section):
     springs_at_size_scale: float | None = quantity(
         4.0,
         "sand.size_scale that the springs belong to, with the default sieve curve. All springs are "
-        "multiplied by the median diameter over that one's, so that neither a scale nor a "
+        "multiplied by the mass-median diameter over that one's, so that neither a scale nor a "
         "sieve curve makes sand harder. This holds in 3D and for discs as thick as a grain. null: "
         "springs are used as given.",
         source=PAPER,
@@ -114,7 +114,7 @@ class Contact(Section):
     )
     wave_speed_m_s: float | None = quantity(
         None,
-        "Speed of a compression wave along a row of median grains in contact. If it is "
+        "Speed of a compression wave along a row of mass-median grains in contact. If it is "
         "given, all springs are multiplied by one factor so that it comes out.",
         unit="m/s",
         source="user",
@@ -211,7 +211,7 @@ class BackgroundDamping(Section):
 
 
 def wave_speed_m_s(sand: Sand, contact: Contact, dimension: int) -> float:
-    """Speed of a compression wave along a straight row of median grains, m/s.
+    """Speed of a compression wave along a straight row of mass-median grains, m/s.
 
     c = d sqrt(k_n/m) of equal masses m between springs k_n, a distance d apart and far shorter
     than the wave: sqrt(4 k_n/(pi rho b)) of discs of thickness b, sqrt(6 k_n/(pi rho d)) of

@@ -62,7 +62,7 @@ class MeshFile(Section):
 
 
 class PatternDrawing(Section):
-    """A solid drawn in an STL or STEP file, 3D only; Gmsh fills it with tetrahedra."""
+    """A solid drawn in a file, 3D only; Gmsh fills it with tetrahedra."""
 
     kind: Literal["drawing"]
     file: str = DRAWING_FILE

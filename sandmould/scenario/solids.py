@@ -4,25 +4,32 @@ from __future__ import annotations
 
 import os
 from collections.abc import Mapping
+from dataclasses import dataclass
 from pathlib import Path
-from typing import Any, Literal, Protocol, TypeVar
+from typing import TYPE_CHECKING, Any, Literal, Protocol, TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
 
 from sandmould import ROOT
 from sandmould.bad_input import BadInputError, Problem, display_path
-from sandmould.geometry.drawing_file import MeshFileError, file_hash
+from sandmould.geometry.drawing_file import MeshFileError, file_hash, tells_unit
 from sandmould.geometry.mesh import TriangleMesh
-from sandmould.geometry.mesher import is_step
 from sandmould.geometry.revolved import Revolved
 from sandmould.scenario.quantity import PLANNED, Section, quantity
+
+if TYPE_CHECKING:
+    from sandmould.geometry.mesh_file import Reading
 
 Array = NDArray[np.float64]
 MANY_TRIANGLES = 100_000
 """From here on the plan tells what a surface takes."""
-READ_S, READ_BYTES = 4e-5, 1300
-"""Time and memory a triangle to read and check a surface: 41 s and 1.3 GB measured at 998 000."""
+UNITS = {0.001: "mm", 0.0254: "inches", 0.01: "cm", 1.0: "m"}
+LOST = 0.04
+"""Share of the longest side of its box below which a part may be drawn in another unit."""
+READ_S, READ_BYTES = 7e-5, 1300
+"""Time and memory a triangle to read, check and merge a surface: 14 s measured at 200 000 on a busy
+core, 1.3 GB at 998 000."""
 
 
 class Cylinder(Section):
@@ -56,8 +63,8 @@ Named = TypeVar("Named", bound=NamesFile)
 
 DRAWING_FILE: Any = quantity(
     ...,
-    "STL or STEP file (.step, .stp). Its path is relative to the file that names it, in a "
-    "resolved scenario to the repository.",
+    "STL, OBJ, PLY, 3MF or STEP file (.step, .stp). Its path is relative to the file that names "
+    "it, in a resolved scenario to the repository.",
     source="user",
     min_length=1,
 )
@@ -69,8 +76,8 @@ DRAWING_HASH: Any = quantity(
 )
 DRAWING_UNIT: Any = quantity(
     1.0,
-    "Length that stands for 1 in an STL file: 0.001 for one drawn in mm. A STEP file tells its "
-    "own unit.",
+    "Length that stands for 1 in the file: 0.001 for one drawn in mm. STEP and 3MF files tell "
+    "their own unit.",
     unit="m",
     source="user",
     gt=0,
@@ -80,7 +87,7 @@ DRAWING_UNIT: Any = quantity(
 
 
 class SolidMesh(Section):
-    """A solid drawn in an STL or STEP file, 3D only."""
+    """A solid drawn in a file, 3D only."""
 
     kind: Literal["mesh"]
     name: str = quantity("mesh", "Name in tables.", source="user", pattern=r"^[a-z][a-z0-9_]*$")
@@ -193,8 +200,8 @@ def drawn_surface(drawing: Drawing, key: str) -> tuple[Array, NDArray[np.int64]]
     from sandmould.geometry.mesh_file import read_surface  # slow to import, and few scenes have it
 
     file_name = display_path(drawing.path)
-    if is_step(drawing.path) and drawing.unit_m != 1.0:
-        valid = "absent, or 1, for a STEP file, which tells its own unit"
+    if tells_unit(drawing.path) and drawing.unit_m != 1.0:
+        valid = "absent, or 1, for a STEP or 3MF file, which tells its own unit"
         raise BadInputError([Problem(f"{key}.unit_m", drawing.unit_m, valid)])
     try:
         sha256_now = file_hash(drawing.path)
@@ -207,55 +214,77 @@ def drawn_surface(drawing: Drawing, key: str) -> tuple[Array, NDArray[np.int64]]
     return drawing.unit_m * vertices, triangles
 
 
-def unit_hint(size_m: Array, box_m: Array, unit_m: float) -> str:
-    """What to say of a drawing far larger than its box: that it may be in mm; else nothing.
-
-    Parameters
-    ----------
-    size_m : (3,) float64, m
-        Of the drawing, as read.
-    box_m : (3,) float64, m
-    unit_m : float, m
-        That it was read with.
-    """
-    if unit_m == 1.0 and (size_m > 10.0 * box_m).any() and (1e-3 * size_m <= box_m).all():
-        return "; with unit_m: 0.001 it fits: it seems to be drawn in mm"
-    return ""
-
-
-def drawing_notes(drawing: Drawing, key: str) -> list[str]:
-    """What was repaired in a drawing, may have been meant otherwise, or takes long to read.
+def other_units(drawing: Drawing, size_m: Array, box_m: Array) -> list[tuple[float, str]]:
+    """Units in which a drawing fits its box and is not lost in it, other than its own.
 
     Parameters
     ----------
     drawing : Drawing
-        Whose file can be read.
-    key : str
-        Key path, for the sentences.
+    size_m : (3,) float64, m
+        As read.
+    box_m : (3,) float64, m
     """
-    from sandmould.geometry.mesh_file import read_surface, repairs  # see drawn_surface
+    if tells_unit(drawing.path):
+        return []
+    sizes = ((unit, unit / drawing.unit_m * size_m) for unit in UNITS if unit != drawing.unit_m)
+    least_m = LOST * box_m.max()
+    return [(unit, UNITS[unit]) for unit, m in sizes if (m <= box_m).all() and m.max() >= least_m]
 
-    done, triangles = repairs(drawing.path), len(read_surface(drawing.path)[1])
-    said = []
-    if done.filled_shells:
-        count = done.filled_shells
-        shells = "1 shell that lies" if count == 1 else f"{count} shells that lie"
-        said.append(
-            f"{key} has {shells} in another one with its faces outwards, and is part of the solid "
-            "there. A cavity faces inwards."
-        )
-    if done.turned_triangles:
-        said.append(
-            f"{key} had {done.turned_triangles} triangles turned inside out. They were turned "
-            "round: their surface has no solid on its other side."
-        )
-    if triangles > MANY_TRIANGLES:
-        said.append(
-            f"{key} has {triangles:,} triangles: every process of the study takes about "
-            f"{READ_S * triangles:.0f} s and {1e-6 * READ_BYTES * triangles:,.0f} MB to read them. "
-            "A coarser surface does as well where its triangles are far smaller than grains."
-        )
-    return said
+
+def unit_hint(drawing: Drawing, size_m: Array, box_m: Array) -> str:
+    """What to say of a drawing far larger than its box: in which unit it fits; else nothing.
+
+    Parameters as of :func:`other_units`.
+    """
+    fits = other_units(drawing, size_m, box_m) if (size_m > 2.0 * box_m).any() else []
+    return "".join(
+        f"; with unit_m: {unit:g} it fits: it seems to be drawn in {name}" for unit, name in fits
+    )
+
+
+@dataclass(frozen=True)
+class DrawnPart:
+    """A drawing as people are told of it."""
+
+    reading: Reading
+    now: TriangleMesh
+    """The surface that is computed with, in the file's unit."""
+    unit_m: float
+    other_units: list[tuple[float, str]]
+    """Units to ask after, of a drawing that is lost in its box."""
+    takes_s: float
+    """Time and memory to read it, 0 where they are small."""
+    takes_bytes: float
+
+    def size_m(self, unit_m: float | None = None) -> Array:
+        """Size in its own unit, or in another, (3,) float64, m."""
+        return (unit_m or self.unit_m) * np.ptp(self.now.vertices_m, axis=0)
+
+
+def drawn_part(drawing: Drawing, box_m: Array) -> DrawnPart:
+    """Measure a drawing whose file can be read.
+
+    Parameters
+    ----------
+    drawing : Drawing
+    box_m : (3,) float64, m
+        Size of the box that it stands in.
+    """
+    from sandmould.geometry.mesh_file import read_drawing  # see drawn_surface
+
+    it = read_drawing(drawing.path)
+    size_m = drawing.unit_m * np.ptp(it.vertices, axis=0)
+    is_lost = size_m.max() < LOST * box_m.max()
+    number = len(it.as_drawn.triangles)
+    long = number if number > MANY_TRIANGLES else 0
+    return DrawnPart(
+        it,
+        TriangleMesh("now", it.vertices, it.triangles),
+        drawing.unit_m,
+        other_units(drawing, size_m, box_m) if is_lost else [],
+        READ_S * long,
+        READ_BYTES * long,
+    )
 
 
 def with_hash(solid: Named) -> Named:

@@ -2,6 +2,10 @@
 
 from __future__ import annotations
 
+from typing import Any
+
+import numpy as np
+
 from sandmould.engines import registry
 from sandmould.geometry.mesh import TriangleMesh
 from sandmould.geometry.outline import Outline
@@ -13,7 +17,7 @@ from sandmould.scenario.checks.wall_thickness import thinnest_wall
 from sandmould.scenario.hardness import LEAST_KAPPA, bed_hardness
 from sandmould.scenario.pattern import PatternDrawing
 from sandmould.scenario.scenario import Scenario
-from sandmould.scenario.solids import SolidMesh, drawing_notes
+from sandmould.scenario.solids import SolidMesh, drawn_part, drawn_surface
 
 HIGH_ACCELERATION_G = 20.0
 """Peak acceleration above which a plan asks whether the amplitude is meant so."""
@@ -26,9 +30,17 @@ def notes(scenario: Scenario) -> tuple[Note, ...]:
     """How stiff the grains are, spaces and walls thinner than they allow, and drawings."""
     smallest_m = scenario.sand.classes(scenario.dimension)[0].diameter_m
     solids: list[Outline | TriangleMesh] = [*scenario.scene.outlines, *scenario.scene.meshes]
-    walls = {solid.name: thinnest_wall([solid], smallest_m) for solid in solids}
-    drawn = {f"obstacles.{n}": it for n, it in enumerate(scenario.obstacles)
-             if isinstance(it, SolidMesh)}  # fmt: skip
+    walls = {
+        solid.name: thinnest_wall([_as_drawn(scenario, solid)], smallest_m) for solid in solids
+    }
+    box_m = np.array(scenario.box.size_m(scenario.dimension))
+    places = {"obstacles": scenario.obstacles, "cavities": scenario.cavities}
+    drawn = {
+        f"{key}.{n}": drawn_part(it, box_m)
+        for key, solids in places.items()
+        for n, it in enumerate(solids)
+        if isinstance(it, SolidMesh)
+    }
     return templates.notes(
         "plan_sand.j2",
         hardness=bed_hardness(scenario),
@@ -43,19 +55,30 @@ def notes(scenario: Scenario) -> tuple[Note, ...]:
         ],
         walls={name: wall for name, wall in walls.items() if wall},
         smallest_m=smallest_m,
-        drawings={key: drawing_notes(it, key) for key, it in drawn.items()},
-        pattern=_pattern_notes(scenario),
+        drawings=drawn,
+        **_of_pattern(scenario),
     )
 
 
-def _pattern_notes(scenario: Scenario) -> list[str]:
-    """What was repaired in the drawing of a pattern, and how good its mesh is."""
+def _as_drawn(scenario: Scenario, solid: Outline | TriangleMesh) -> Outline | TriangleMesh:
+    """A solid, a drawn pattern by its drawing: its elements cut corners."""
+    pattern = scenario.pattern
+    if pattern is None or solid.name != pattern.name:
+        return solid
+    if not isinstance(pattern.shape, PatternDrawing):
+        return solid
+    drawn_m, triangles = drawn_surface(pattern.shape, "pattern.shape")
+    return TriangleMesh(solid.name, drawn_m + np.array(pattern.position_m), triangles)
+
+
+def _of_pattern(scenario: Scenario) -> dict[str, Any]:
+    """What a drawn pattern measures, and how good its mesh is."""
     if scenario.pattern is None or not isinstance(scenario.pattern.shape, PatternDrawing):
-        return []
+        return {"pattern": None}
     from sandmould.pattern_fe.quality import mesh_sentence
     from sandmould.pattern_fe.scene import pattern_of
 
-    return [
-        *drawing_notes(scenario.pattern.shape, "pattern.shape"),
-        mesh_sentence(scenario, pattern_of(scenario)),
-    ]
+    return {
+        "pattern": drawn_part(scenario.pattern.shape, np.array(scenario.box.size_m(3))),
+        "pattern_mesh": mesh_sentence(scenario, pattern_of(scenario)),
+    }

@@ -5,6 +5,8 @@ from __future__ import annotations
 from functools import lru_cache
 from typing import Any
 
+import numpy as np
+
 from sandmould.casting.arpm import scene
 from sandmould.casting.arpm.estimates import (
     Cooled,
@@ -17,7 +19,7 @@ from sandmould.runs import templates
 from sandmould.runs.templates import Note
 from sandmould.scenario.casting.solidification import Solidification
 from sandmould.scenario.checks.wall_thickness import ThinWall, thinnest_wall
-from sandmould.scenario.solids import SolidMesh, drawing_notes
+from sandmould.scenario.solids import SolidMesh, drawn_part
 
 FEWEST_ELEMENTS = 2
 """Through a wall: with fewer its inside and its surface are one."""
@@ -47,7 +49,7 @@ def notes(scenario: Solidification) -> tuple[Note, ...]:
         drawn=drawn,
         held=held if abs(held / drawn - 1.0) > VOLUME_OFF else drawn,
         drawings={
-            f"shapes.{n}": drawing_notes(shape, f"shapes.{n}")
+            f"shapes.{n}": drawn_part(shape, np.subtract(scenario.box.high_m, scenario.box.low_m))
             for n, shape in enumerate(scenario.shapes)
             if isinstance(shape, SolidMesh)
         },

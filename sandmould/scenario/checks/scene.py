@@ -150,7 +150,7 @@ def _mesh(s: Scenario, solid: SolidMesh, key: str) -> Iterator[Problem]:
         ends_m = (corners_m.min(axis=0).tolist(), corners_m.max(axis=0).tolist())
         low, high = (f"({', '.join(f'{x:.4g}' for x in end)})" for end in ends_m)
         box_m = np.array([s.box.width_m, s.box.depth_m, s.box.height_m])
-        hint = unit_hint(np.ptp(corners_m, axis=0), box_m, solid.unit_m)
+        hint = unit_hint(solid, np.ptp(corners_m, axis=0), box_m)
         valid = (
             f"one that puts the mesh, now from {low} to {high} m, inside the box, {_size(s)}{hint}"
         )

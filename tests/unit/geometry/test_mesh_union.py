@@ -15,7 +15,7 @@ from sandmould.casting.arpm.raster import painted
 from sandmould.geometry.drawing_file import MeshFileError
 from sandmould.geometry.geometry import Block
 from sandmould.geometry.mesh import TriangleMesh
-from sandmould.geometry.mesh_file import read_surface, repairs
+from sandmould.geometry.mesh_file import read_drawing, read_surface
 from tests.unit.geometry.test_mesh_file import write_stl
 from tests.unit.meshes import CORNERS, FACETS
 
@@ -181,8 +181,8 @@ def test_cavity_that_sticks_out_is_refused(tmp_path: Path) -> None:
 
 
 def test_shell_that_changes_nothing_is_counted(tmp_path: Path) -> None:
-    assert repairs(file_of(SCENES["one in the other"][0], tmp_path)).filled_shells == 1
-    assert repairs(file_of(SCENES["hollow"][0], tmp_path)).filled_shells == 0
+    assert read_drawing(file_of(SCENES["one in the other"][0], tmp_path)).filled_shells == 1
+    assert read_drawing(file_of(SCENES["hollow"][0], tmp_path)).filled_shells == 0
 
 
 def test_union_has_no_narrower_triangles_than_its_parts(tmp_path: Path) -> None:

@@ -112,7 +112,8 @@ CASES: dict[str, tuple[str, str]] = {
     "mesh that is no STL": (
         "based_on: bracket\nscenario: {obstacles: [{kind: mesh, file: trial.yaml}]}",
         "trial.yaml: scenario.obstacles.0.file = 'trial.yaml' cannot be used: "
-        "valid is an STL file, ASCII or binary.",
+        "valid is an STL file, ASCII or binary, or one of OBJ, PLY, 3MF or STEP whose name ends "
+        "so.",
     ),
     "mesh outside the box": (
         "based_on: tube_3d_small\nscenario: {obstacles: [{kind: mesh, "

@@ -18,10 +18,12 @@ from sandmould.casting.arpm.raster import Raster
 from sandmould.casting.arpm.solidification import solidify
 from sandmould.kinds.sand import notes as notes_of_sand
 from sandmould.scenario.checks.wall_thickness import thinnest_wall
+from sandmould.scenario.solids import SolidMesh, drawn_part, other_units, unit_hint
 from sandmould.study.plan.expand import expand
 from sandmould.study.plan.load_study import open_study
 from sandmould.study.plan.plan_files import plan_table
 from sandmould.study.plan.price import Prices
+from tests.drawings import BODIES, DAMAGES, binary, written
 from tests.scenes import TUBE_SCENE
 from tests.unit.geometry.test_mesh_union import CUBE, box, file_of
 from tests.unit.kinds.test_solidification_study import opened
@@ -209,10 +211,55 @@ def test_a_shell_that_is_no_cavity_is_told(tmp_path: Path) -> None:
     mesh = {"kind": "mesh", "file": "parts.stl", "unit_m": 0.001}
     room = {"low_m": [0.0, 0.0, 0.0], "high_m": [0.028, 0.028, 0.028]}
     notes = notes_of(tmp_path, shapes=[mesh], box=room, probes=[], element_m=0.002)
-    assert any(
-        note.startswith("Drawing shapes.0: shapes.0 has 1 shell that lies in another one")
-        for note in notes
+    (told,) = [note for note in notes if note.startswith("Drawing shapes.0: ")]
+    assert told.endswith(
+        " cm3 in 12 triangles. 1 shell lies in another one with faces outwards, and is part of the "
+        "solid there. A cavity faces inwards."
     )
+
+
+@pytest.mark.parametrize(
+    ("damage", "says"),
+    [
+        ("one_missing", "It was mended: 1 hole of 6.00 cm2 closed, which leaves 0 % of the volume "
+         "unknown. The surface is now 52.00 cm2, as drawn 46.00; as drawn it enclosed no volume."),
+        ("drawn_twice", "It was mended: 1 triangle without area, drawn twice or outside of every "
+         "surface left away. The surface is now 52.00 cm2, as drawn "),
+        ("point_on_an_edge", "It was mended: 1 end of open edges joined to the edge or end beside, "
+         "by at most 0.00400 mm. The surface is now 52.00 cm2, as drawn 52.00; as drawn it"),
+        ("one_turned", "1 triangle was drawn inside out and turned round: a closed surface says"),
+    ],
+)  # fmt: skip
+def test_a_mended_drawing_is_told_with_its_changes(damage: str, says: str, tmp_path: Path) -> None:
+    written(tmp_path / "part.stl", binary(DAMAGES[damage](BODIES["box"][0])))
+    mesh = {"kind": "mesh", "file": "part.stl", "unit_m": 0.001, "position_m": [0.01, 0.01, 0.01]}
+    room = {"low_m": [0.0, 0.0, 0.0], "high_m": [0.06, 0.052, 0.04]}
+    notes = notes_of(tmp_path, shapes=[mesh], box=room, probes=[], element_m=0.002)
+    (told,) = [note for note in notes if note.startswith("Drawing shapes.0: ")]
+    assert "It measures 40 x 30 x 20 mm and 24.00 cm3 in 1" in told
+    assert says in told
+
+
+@pytest.mark.parametrize(
+    ("drawn_in", "read_with", "asks"),
+    [
+        (25.4, 0.001, [(0.0254, "inches"), (0.01, "cm")]),
+        (1.0, 0.001, []),
+        (1.0, 1.0, [(0.001, "mm")]),
+        (10.0, 0.001, [(0.0254, "inches"), (0.01, "cm")]),
+    ],
+)
+def test_the_units_in_which_a_drawing_fits_its_box(
+    drawn_in: float, read_with: float, asks: list[tuple[float, str]], tmp_path: Path
+) -> None:
+    vertices, triangles = BODIES["box"][0]
+    path = written(tmp_path / "part.stl", binary((vertices / drawn_in, triangles)))
+    solid = SolidMesh(kind="mesh", file=str(path), unit_m=read_with)
+    size_m, box_m = read_with * np.array([40.0, 30.0, 20.0]) / drawn_in, np.full(3, 0.12)
+    assert bool(drawn_part(solid, box_m).other_units) == (drawn_in > 1.0)
+    hint = unit_hint(solid, size_m, box_m)
+    assert bool(hint) == (read_with == 1.0)
+    assert [*other_units(solid, size_m, box_m)] == asks or not asks
 
 
 def test_layers_that_break_the_kernels_rule_are_refused_by_the_plan(tmp_path: Path) -> None:
