@@ -70,7 +70,7 @@ def _compute(plan: Plan, options: Sequence[str], opening: str) -> int:
     if starts_jobs(options):
         replace_driver(plan.study.name)
     folder, study = RESULTS / plan.study.name, plan.study.study
-    is_whole_study = not options or options[0] == "--cores" and len(options) == 2
+    is_whole_study = not options or (options[0] == "--cores" and len(options) == 2)
     if is_whole_study and is_settled(plan, RESULTS):
         runs = len(plan.runs)
         print(f"{plan.study.name}: {runs} of {runs} runs done before", file=sys.stderr)

@@ -92,7 +92,7 @@ def test_a_run_that_a_start_would_compute_again_gives_way_and_others_stay(packed
     unpack(packed, RESULTS)
     plan = open_plan(Path("two.yaml"))
     older, begun = run_folder(plan, 0), run_folder(plan, 1)
-    manifest = read_manifest(older) or {}
+    manifest = read_manifest(older)
     manifest["origin"]["template_sha256"] = "of an older solver"
     save_manifest(older, manifest)
     (older / "notes.txt").write_text("mine")
@@ -126,7 +126,7 @@ def test_the_last_state_alone_is_whole_but_cannot_be_measured_again(
             np.zeros((2, 2)), np.zeros((2, 2)), np.zeros((2, 3)), np.ones(2),
         ))  # fmt: skip
     file.close()
-    manifest = read_manifest(folder) or {}
+    manifest = read_manifest(folder)
     manifest["computed"][SNAPSHOTS] = (folder / SNAPSHOTS).stat().st_size
     save_manifest(folder, manifest)
     pack(plan, RESULTS, last_state=True)

@@ -188,7 +188,7 @@ def test_record_of_a_study_that_compares_keeps_its_agreement_and_engines(
     first = folder / "runs" / runs[0].run
     first.mkdir(parents=True)
     said = {"commit": "abc1234", "versions": {}, "machine": {}}
-    (first / "provenance.json").write_text(json.dumps(said))
+    save_manifest(first, {"origin": said})
     rows = [{"run": r.run, "engine": r.scenario.engine.name, "version": "7", "outcome_code": 0,
              "outcome": "finished", "wall_s": 2.0, "grain_steps": 1e6, "grain_steps_per_s": 5e5}
             for r in runs]  # fmt: skip

@@ -8,13 +8,11 @@ import shutil
 from collections.abc import Callable
 from pathlib import Path
 
-import pandas as pd
 import pytest
 
 from sandmould.execution.simulate import measure_run
 from sandmould.execution.status import run_status, status_text
-from sandmould.runs.manifest import LEFT_OUT, MANIFEST_FILE, OLDER_COST, OLDER_ORIGIN
-from sandmould.runs.run_tables import read_costs
+from sandmould.runs.manifest import LEFT_OUT, MANIFEST_FILE
 from sandmould.study.plan.build_plan import RESULTS, Plan, open_plan, prepare
 from sandmould.study.plan.lacking import WHOLE, Lack, Need, lack_of, notes_of
 from tests.finished_study import finished_study, study_text
@@ -121,20 +119,6 @@ def test_what_is_no_damage_computes_nothing(harmless: Callable[[Path], None], pl
     harmless(folder_of(plan))
     assert plan.lacks(RESULTS) == {}
     assert prepare(plan, RESULTS) == ""
-
-
-def test_a_run_of_older_times_needs_its_files_to_be_there(plan: Plan) -> None:
-    folder = folder_of(plan)
-    tree = json.loads((folder / MANIFEST_FILE).read_text())
-    (folder / OLDER_ORIGIN).write_text(json.dumps(tree["origin"]))
-    pd.DataFrame([tree["cost"]]).to_csv(folder / OLDER_COST, sep="\t", index=False)
-    (folder / MANIFEST_FILE).unlink()
-    assert lack(plan) == WHOLE
-    assert read_costs([folder]).rows["engine"][0] == tree["cost"]["engine"]
-    (folder / "measures.tsv").write_bytes(b"")
-    assert lack(plan) == Lack(Need.MEASURE, "measures.tsv is missing or empty")
-    (folder / "series.tsv").unlink()
-    assert lack(plan) == Lack(Need.COMPUTE, "series.tsv is missing or empty")
 
 
 def test_a_killed_measurement_is_done_again(plan: Plan) -> None:
