@@ -18,6 +18,7 @@ from sandmould.engines.snapshot import Snapshot
 from sandmould.execution import records
 from sandmould.kinds.sand.exports import write_exports, write_picture
 from sandmould.kinds.sand.measure import write_measures, write_profile
+from sandmould.runs.manifest import save_manifest
 from sandmould.study.plan.expand import expand
 from sandmould.study.plan.load_study import open_study
 from sandmould.study.plan.plan_files import read_run
