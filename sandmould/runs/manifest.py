@@ -23,7 +23,7 @@ LEFT_OUT = "left_out"
 MEASURED_BY = "measured_by"
 """What names the code that took the measures."""
 HASHES = "sha256"
-"""Of each file that a step left, and of the outcome; runs of older times have none."""
+"""Of each file that a step left, and of the outcome."""
 SEAL = "seal"
 """Hash of all else that is written down."""
 Manifest = dict[str, dict[str, Any]]
@@ -153,24 +153,16 @@ def damage(folder: Path, sizes: Mapping[str, Any]) -> str:
 
 def change(folder: Path, manifest: Manifest) -> str:
     """Say which file of a run without ``damage`` is another than it left; empty where none is."""
-    seal = manifest.get(SEAL, {MANIFEST_FILE: ""} if HASHES in manifest else None)
-    if seal is not None and seal.get(MANIFEST_FILE) != _seal_of(manifest):
+    if manifest.get(SEAL, {}).get(MANIFEST_FILE) != _seal_of(manifest):
         return f"{MANIFEST_FILE} is not as the run wrote it"
-    for name, known in manifest.get(HASHES, {}).items():
-        if name not in (OUTCOME_FILE, *listed_files(manifest)):
-            continue
+    for name in (OUTCOME_FILE, *listed_files(manifest)):
         try:
             now = file_digest(folder / name)
         except OSError as error:
             now = str(error)
-        if now != known:
+        if now != manifest.get(HASHES, {}).get(name):
             return f"{name} is not as the run wrote it"
     return ""
-
-
-def has_all_hashes(manifest: Manifest) -> bool:
-    """Whether more than the size is known of each file."""
-    return {OUTCOME_FILE, *listed_files(manifest)} <= manifest.get(HASHES, {}).keys()
 
 
 def listed_files(manifest: Manifest) -> dict[str, Any]:

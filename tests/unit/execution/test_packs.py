@@ -15,7 +15,7 @@ import pytest
 
 from sandmould.bad_input import BadInputError
 from sandmould.definition.run import Run
-from sandmould.digest import digest
+from sandmould.digest import digest, file_digest
 from sandmould.engines.snapshot import Snapshot
 from sandmould.engines.snapshot_file import SNAPSHOTS, SnapshotFile, stored_snapshots
 from sandmould.execution.packs import recorded
@@ -128,6 +128,7 @@ def test_the_last_state_alone_is_whole_but_cannot_be_measured_again(
     file.close()
     manifest = read_manifest(folder)
     manifest["computed"][SNAPSHOTS] = (folder / SNAPSHOTS).stat().st_size
+    manifest["sha256"][SNAPSHOTS] = file_digest(folder / SNAPSHOTS)
     save_manifest(folder, manifest)
     pack(plan, RESULTS, last_state=True)
     shutil.rmtree(RESULTS)
