@@ -73,7 +73,7 @@ def _compute(plan: Plan, options: Sequence[str], opening: str) -> int:
     is_whole_study = not options or (options[0] == "--cores" and len(options) == 2)
     if is_whole_study and is_settled(plan, RESULTS):
         runs = len(plan.runs)
-        print(f"{plan.study.name}: {runs} of {runs} runs done before", file=sys.stderr)
+        print(f"{plan.study.name}: {runs} of {runs} runs done, nothing left", file=sys.stderr)
         print(f"{opening} {last_line(folder)}".strip())
         return 0
     while study.refine.rounds or study.certificate.controls:

@@ -52,7 +52,7 @@ def test_a_study_from_an_empty_folder(tmp_path: Path, monkeypatch: pytest.Monkey
 
     # Nothing is left to do: the same is said without Snakemake, which agrees.
     again = subprocess.run(command, capture_output=True, text=True, timeout=120)
-    assert (again.stdout, again.stderr) == (ran.stdout, "coarse: 2 of 2 runs done before\n")
+    assert (again.stdout, again.stderr) == (ran.stdout, "coarse: 2 of 2 runs done, nothing left\n")
     files = ("--configfile", "coarse.yaml", "--cores", "1")
     dry = dry_run(*files, folder=tmp_path)
     assert "Nothing to be done" in dry.stdout + dry.stderr
