@@ -6,6 +6,7 @@ looks at is noted when it has ended well, and it is asked again once any of that
 
 from __future__ import annotations
 
+import contextlib
 from collections.abc import Iterator
 from pathlib import Path
 
@@ -13,14 +14,16 @@ from sandmould import SHIPPED
 from sandmould.definition.run import LAST_MEASURED
 from sandmould.digest import digest
 from sandmould.execution.packs.recorded import record_of
+from sandmould.execution.spent import SPENT_FILE
 from sandmould.plain_file import UNREADABLE, read_plain
+from sandmould.runs.claim import CLAIM_FILE
 from sandmould.runs.files import write_text
 from sandmould.runs.manifest import MANIFEST_FILE, OUTCOME_FILE
 from sandmould.study.plan.build_plan import Plan, write_files
 from sandmould.study.plan.plan_files import SUMMARY
 
 _FILE = "settled.txt"
-_NOT_LOOKED_AT = ("logs", "lock", "lock_owner", "spent_s.txt", _FILE)
+_NOT_LOOKED_AT = ("logs", "lock", CLAIM_FILE, SPENT_FILE, _FILE)
 _OF_RUN = ("deck.in", OUTCOME_FILE, MANIFEST_FILE, "series.tsv", LAST_MEASURED)
 
 
@@ -41,7 +44,8 @@ def is_settled(plan: Plan, results: Path) -> bool:
 
 def note_settled(plan: Plan, results: Path) -> None:
     """Note that nothing is left to do."""
-    write_text(results / plan.study.name / _FILE, _state(plan, results))
+    with contextlib.suppress(OSError):  # without it Snakemake is asked once more
+        write_text(results / plan.study.name / _FILE, _state(plan, results))
 
 
 def _state(plan: Plan, results: Path) -> str:
