@@ -11,6 +11,7 @@ import pandas as pd
 from sandmould.engines.snapshot import Snapshot
 from sandmould.pattern_fe.coupling.convergence_log import CONVERGENCE_LOG
 from sandmould.pattern_fe.coupling.foam_body import FoamBody
+from sandmould.runs.manifest import save_manifest
 
 FORCE_N = -0.2
 """On the tip of the flange, downwards."""
@@ -43,7 +44,7 @@ def write_bent_run(folder: Path, body: FoamBody, share: float = 1.0) -> None:
             pattern_m=moved_m, pattern_load_n=load,
         ).save(folder / "snapshots" / f"{number:06d}.npz")  # fmt: skip
     write_convergence_log(folder)
-    pd.DataFrame({"wall_s": [6.0]}).to_csv(folder / "cost.tsv", sep="\t", index=False)
+    save_manifest(folder, {"cost": {"wall_s": 6.0}})
 
 
 def tip_load(body: FoamBody) -> tuple[np.ndarray, np.ndarray]:

@@ -6,7 +6,6 @@ core, and all else is what any run does. No code is swapped.
 
 from __future__ import annotations
 
-import json
 import os
 import shutil
 import subprocess
@@ -19,6 +18,7 @@ from typing import Any
 
 from sandmould import ROOT
 from sandmould.runs.hashing import scenario_hash
+from sandmould.runs.manifest import MANIFEST_FILE, read_manifest, save_manifest
 from sandmould.study.plan.build_plan import open_plan
 
 REPLICATES = 5
@@ -159,13 +159,11 @@ def graft(place: Place, study: Path, source: Path) -> int:
         for product in products[like]:
             os.link(finished[like] / product, target / product)
             linked += 1
-        # Its origin is its own, to the byte as long: else it would be computed again.
-        origin = target / "provenance.json"
-        own = json.loads(origin.read_text("utf-8")) | {
-            "scenario_sha256": scenario_hash(run.scenario)
-        }
-        origin.unlink()
-        origin.write_text(json.dumps(own, indent=1) + "\n", encoding="utf-8")
+        # Its origin is its own: else it would be computed again.
+        manifest = read_manifest(target)
+        own = manifest["origin"] | {"scenario_sha256": scenario_hash(run.scenario)}
+        (target / MANIFEST_FILE).unlink()
+        save_manifest(target, manifest | {"origin": own})
     # Products are older than the plan; links share their times, so the plan is dated back.
     oldest = min(p.stat().st_mtime for p in (source / "runs").rglob("*") if p.is_file())
     for path in (*folder.glob("runs/*/scenario.yaml"), folder / "runs.tsv", folder / "study.yaml"):

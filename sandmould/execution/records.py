@@ -38,7 +38,7 @@ from sandmould.runs.columns import (
 )
 from sandmould.runs.formatting import listed
 from sandmould.runs.hashing import scenario_hash
-from sandmould.runs.manifest import read_origin
+from sandmould.runs.manifest import read_manifest
 from sandmould.runs.outcome import Outcome
 from sandmould.study.collect import read_collected, read_summary
 from sandmould.study.plan.build_plan import open_plan
@@ -125,7 +125,7 @@ def record(path: Path, results: Path, figures: Sequence[str] = ()) -> Path:
     failed = summary[summary[OUTCOME] != Outcome.FINISHED.label]
     names = [SUMMARY, *(["agreement.tsv"] if _compares(study.study) else [])]
     names += [name for name in (ROUNDS_FILE, CHECKS[0]) if (folder / name).exists()]
-    provenance = read_origin(folder / "runs" / runs[0].run)
+    provenance = read_manifest(folder / "runs" / runs[0].run)["origin"]
     record: dict[str, Any] = {
         "study": str(path),
         "study_sha256": study_hash(runs),

@@ -24,6 +24,7 @@ from sandmould.execution.cluster.settings import goes_to_slurm, may_be_elsewhere
 from sandmould.execution.locks import let_go
 from sandmould.execution.screen.ending import last_line, trouble
 from sandmould.execution.screen.screen import Screen
+from sandmould.execution.settled import is_settled, note_settled
 from sandmould.execution.spent import note_spent
 from sandmould.execution.stopping import Stopped, run_in_group, until_stopped
 from sandmould.study.plan.build_plan import RESULTS, Plan, checked_plan, starts_jobs, writing
@@ -69,6 +70,12 @@ def _compute(plan: Plan, options: Sequence[str], opening: str) -> int:
     if starts_jobs(options):
         replace_driver(plan.study.name)
     folder, study = RESULTS / plan.study.name, plan.study.study
+    is_whole_study = not options or (options[0] == "--cores" and len(options) == 2)
+    if is_whole_study and is_settled(plan, RESULTS):
+        runs = len(plan.runs)
+        print(f"{plan.study.name}: {runs} of {runs} runs done, nothing left", file=sys.stderr)
+        print(f"{opening} {last_line(folder)}".strip())
+        return 0
     while study.refine.rounds or study.certificate.controls:
         if _snakemake(plan, options, [str(folder / SUMMARY)]):
             # Stopped, or broken outside the runs: a run that fails leaves its outcome.
@@ -83,6 +90,8 @@ def _compute(plan: Plan, options: Sequence[str], opening: str) -> int:
     status = _snakemake(plan, options, [])
     if starts_jobs(options) and (said := last_line(folder)):
         print(said if status else f"{opening} {said}".strip())
+    if is_whole_study and not status:
+        note_settled(plan, RESULTS)
     return status
 
 

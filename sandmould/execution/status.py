@@ -29,7 +29,7 @@ from sandmould.plain_file import UNREADABLE, read_json
 from sandmould.runs.claim import owner_of
 from sandmould.runs.formatting import size_text
 from sandmould.runs.hashing import scenario_hash
-from sandmould.runs.manifest import change, has_all_hashes, read_cost, read_manifest
+from sandmould.runs.manifest import change, read_manifest
 from sandmould.runs.outcome import Outcome, RunOutcome
 from sandmould.runs.progress import duration_text
 from sandmould.study.plan.build_plan import Plan, stored_speeds
@@ -106,7 +106,7 @@ def _ended(folder: Path) -> RunStatus:
     outcome = RunOutcome.read(folder / "outcome.json")
     cpu_s = wall_s = math.nan
     with contextlib.suppress(*UNREADABLE):
-        cost = read_cost(folder)
+        cost = read_manifest(folder)["cost"]
         cpu_s, wall_s = float(cost["cpu_s"]), float(cost["wall_s"])
     cpu_s = cpu_s if math.isfinite(cpu_s) else 0.0
     if outcome.outcome is Outcome.FINISHED:
@@ -193,20 +193,15 @@ def status_text(plan: Plan, results: Path, cores: int, deep: bool = False) -> st
 def _deep_lines(runs: Sequence[Run], folder: Path) -> list[str]:
     """What the hashes say of files of runs that lack nothing by the sizes."""
     damaged: dict[str, str] = {}
-    of_sizes = 0
     for run in runs:
         place = folder / run.place
-        manifest = read_manifest(place) or {}
-        of_sizes += not has_all_hashes(manifest)
-        if why := change(place, manifest) or _replanned(run, place / "scenario.yaml"):
+        if why := change(place, read_manifest(place)) or _replanned(run, place / "scenario.yaml"):
             damaged[run.place] = why
     lines = [f"  damaged: {place}  {why}" for place, why in damaged.items()]
     if damaged:
         lines.append("remove a damaged file: the next start makes it again")
     else:
         lines.append(f"{len(runs)} runs and fills checked: no file is damaged")
-    if of_sizes:
-        lines.append(f"{of_sizes} of them are of an older version: only sizes are known")
     return lines
 
 

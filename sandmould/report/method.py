@@ -304,7 +304,7 @@ def provenance_rows(all_runs: Sequence[Mapping[str, Any]]) -> tuple[Row, ...]:
     Parameters
     ----------
     all_runs : sequence of mapping
-        The ``provenance.json`` of each run.
+        The origin of each run, of its ``products.json``.
     """
     flat = [dict(_flatten(p)) for p in all_runs if p]
     rows = []

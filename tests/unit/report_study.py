@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 from collections.abc import Mapping, Sequence
 from pathlib import Path
 
@@ -11,6 +10,7 @@ import pandas as pd
 
 from sandmould.definition.run import Run
 from sandmould.engines.snapshot import Snapshot
+from sandmould.runs.manifest import save_manifest
 from sandmould.runs.outcome import Outcome, RunOutcome
 from sandmould.scenario.box import Box, Tube
 from sandmould.scenario.fill import Fill, Layer
@@ -247,7 +247,6 @@ def write_run(
         "time_step_fraction": 0.5, "largest_overlap_fraction": 0.034,
         "grain_steps_per_s": speed or 400_000 * grains / 41.5,
     }  # fmt: skip
-    pd.DataFrame([cost]).to_csv(path / "cost.tsv", sep="\t", index=False)
     said = {
         "template_sha256": "0f3a" * 16,
         "seed": run.seed,
@@ -255,4 +254,4 @@ def write_run(
         "machine": {"system": "Linux", "cores": 2},
         "command": "snakemake --configfile config/studies/tube_demo.yaml",
     }
-    (path / "provenance.json").write_text(json.dumps(said))
+    save_manifest(path, {"cost": cost, "origin": said})

@@ -15,6 +15,7 @@ import pytest
 from typer.testing import CliRunner
 
 from sandmould.cli.commands import app
+from tests.workflow.dry_runs import dry_run
 
 COARSE = """\
 based_on: plates
@@ -38,7 +39,8 @@ def test_a_study_from_an_empty_folder(tmp_path: Path, monkeypatch: pytest.Monkey
     said = (results / "verdict.txt").read_text().strip()
     assert said
     assert ran.stdout == f"{said} The report: results/coarse/report.html\n"
-    *_, first, second, last = ran.stderr.splitlines()
+    *lines, last = ran.stderr.splitlines()
+    first, second = (line for line in lines if line.startswith("["))
     assert first.startswith("[1/2] ")
     assert second.startswith("[2/2] ")
     assert last.startswith("coarse: 2 of 2 runs done after ")
@@ -48,6 +50,17 @@ def test_a_study_from_an_empty_folder(tmp_path: Path, monkeypatch: pytest.Monkey
     summary = pd.read_csv(results / "summary.tsv", sep="\t")
     assert list(summary["outcome"]) == ["finished"] * 2
     assert {p.name for p in tmp_path.iterdir()} == {".snakemake", "coarse.yaml", "results"}
+
+    # Nothing is left to do: the same is said without Snakemake, which agrees.
+    again = subprocess.run(command, capture_output=True, text=True, timeout=120)
+    assert (again.stdout, again.stderr) == (ran.stdout, "coarse: 2 of 2 runs done, nothing left\n")
+    files = ("--configfile", "coarse.yaml", "--cores", "1")
+    dry = dry_run(*files, folder=tmp_path)
+    assert "Nothing to be done" in dry.stdout + dry.stderr
+    (results / "summary.tsv").touch()
+    again = subprocess.run(command, capture_output=True, text=True, timeout=120)
+    assert again.returncode == 0
+    assert "coarse: 2 of 2 runs done after " in again.stderr
 
     said = CliRunner().invoke(app, ["status", "coarse.yaml"])
     assert said.stdout.startswith("coarse: 2 done of 2 runs\n")

@@ -102,8 +102,6 @@ def _files_of(place: Path, anew: Path, last_state: bool, others: Container[str])
         Why it cannot be packed.
     """
     manifest = read_manifest(place)
-    if manifest is None:
-        raise ValueError("of an older version, without a list of its files")
     if why := change(place, manifest):
         raise ValueError(why)
     anew.mkdir()

@@ -16,7 +16,7 @@ RECORDS = ROOT / "docs" / "results"
 def record_part(plan: Plan, results: Path) -> str:
     """Pack the runs of a study at their end into its record, with those of it that still fit."""
     plan, _ = take_up(plan, results)
-    path = _record_of(plan)
+    path = record_of(plan)
     path.parent.mkdir(parents=True, exist_ok=True)
     return pack_study(plan, results, path, last_state=True)
 
@@ -38,7 +38,7 @@ def take_up(plan: Plan, results: Path) -> tuple[Plan, str]:
     BadInputError
         Where the pack cannot be read.
     """
-    path, folder = _record_of(plan), results / plan.study.name
+    path, folder = record_of(plan), results / plan.study.name
     shipped = plan.study.path.resolve().parent == (SHIPPED / "config" / "studies").resolve()
     if not (shipped and path.is_file()):
         return plan, ""
@@ -51,5 +51,6 @@ def take_up(plan: Plan, results: Path) -> tuple[Plan, str]:
     return plan, f"{taken} runs taken from the record of {plan.study.name}" if taken else ""
 
 
-def _record_of(plan: Plan) -> Path:
+def record_of(plan: Plan) -> Path:
+    """The pack that a shipped study's runs may lie in."""
     return RECORDS / plan.study.name / f"{plan.study.name}_runs{SUFFIX}"

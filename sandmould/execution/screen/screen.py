@@ -141,7 +141,7 @@ class Screen:
         for run in ended:
             self._end(run)
         if self._table is not None:
-            view = self._view()
+            view = self._view(self._said_so_far())
             size = self._console.size
             self._table.update(study_table(view, size.width, size.height), refresh=True)
         else:
@@ -194,7 +194,7 @@ class Screen:
             self._so_far.add(self._whole)
         return self._so_far
 
-    def _view(self) -> StudyView:
+    def _view(self, so_far: str = "") -> StudyView:
         time_left, running = self._time_left_known(), self._watch.running
         passed_s = time.monotonic() - self._begun_s
         for run, at in running.items():
@@ -220,7 +220,7 @@ class Screen:
             left_s=left_s,
             awaits=awaits,
             share=passed_s / (passed_s + left_s) if passed_s + left_s else 0.0,
-            so_far=self._said_so_far(),
+            so_far=so_far,
             ended=tuple(self._ended),
             failures=tuple(self.failures),
         )
@@ -250,8 +250,6 @@ class Screen:
 
     def _lines(self, ended: list[Ended]) -> None:
         """Plain lines: each run that has ended, and now and then the whole study."""
-        if ended:
-            self._so_far_known().sentence(force=True)
         total = len(self._plan.runs)
         before = self._done + len(self.failures) - len(ended)
         for number, run in enumerate(ended, before + 1):
@@ -261,7 +259,7 @@ class Screen:
             self._told.add(run.run)
         if (now := time.monotonic()) >= self._next_line_s:
             self._next_line_s = now + LINE_EVERY_S
-            view = self._view()
+            view = self._view(self._said_so_far())
             so_far = f"; so far: {view.so_far}" if view.so_far else ""
             self._print(f"{view.name}: {counts_text(view)}; {times_text(view)}{so_far}")
 

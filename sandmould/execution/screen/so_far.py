@@ -36,31 +36,29 @@ class SoFar:
         self._summary = pd.DataFrame()
         self._unread: list[str] = []
         self._said = ""
+        self._judged = True
         self._next_s = 0.0
 
     def add(self, runs: Sequence[str]) -> None:
         """Note runs that have ended."""
         self._unread += runs
 
-    def sentence(self, force: bool = False) -> str:
-        """What the runs say so far; empty before the first has a value.
-
-        Parameters
-        ----------
-        force : bool
-            Whether it is worked out however lately that was done.
-        """
+    def sentence(self) -> str:
+        """What the runs say so far; empty before the first has a value."""
         begun = time.monotonic()
-        if self._unread and (force or begun >= self._next_s):
+        if (self._unread or not self._judged) and begun >= self._next_s:
             # A table that cannot be read now is told by the report; the sentence stays as it was.
             with contextlib.suppress(*UNREADABLE):
                 self._read()
                 self._said = so_far_text(self._summary, self._study, self._settings)
+                self._judged = True
             self._next_s = time.monotonic() + (time.monotonic() - begun) / _SHARE_OF_TIME
         return self._said
 
     def value_text(self, run: str) -> str:
-        """The objective of a run that was read, with its name; empty where it has none."""
+        """The objective of a run that has ended, with its name; empty where it has none."""
+        with contextlib.suppress(*UNREADABLE):
+            self._read()
         measure = self._study.objective.measure
         if self._summary.empty:
             return ""
@@ -68,12 +66,14 @@ class SoFar:
         return f"{name_of(measure)} {number(values.iloc[0])}" if len(values) else ""
 
     def _read(self) -> None:
+        if not self._unread:
+            return
         if self._planned is None:
             self._planned = read_runs(self._folder)
             swept = sweep_part(self._planned)
             self._settings = len(setting_rows(swept, swept_keys(swept)))
         rows = self._planned[self._planned[RUN].isin(self._unread)].reset_index(drop=True)
-        self._unread = []
+        self._unread, self._judged = [], False
         new = gather_runs(rows, self._folder, self._study.own_measures).summary
         parts = [part for part in (self._summary, new) if not part.empty]
         self._summary = pd.concat(parts, ignore_index=True) if parts else self._summary

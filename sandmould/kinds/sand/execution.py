@@ -8,6 +8,7 @@ from pathlib import Path
 from sandmould.bad_input import BadInputError, Problem, display_path
 from sandmould.definition.run import FILL, PICTURE, Run
 from sandmould.engines import recording, registry
+from sandmould.engines.deck import environment
 from sandmould.engines.driver import Driver, Opening
 from sandmould.engines.durations import cost_before
 from sandmould.engines.program import Program, build_program
@@ -90,8 +91,9 @@ class SandExecution(Execution[Scenario]):
         write_exports(run.scenario, folder, folder / "exports.zip")
 
     def load_computing(self, scenario: Scenario) -> None:
-        """Import the engine's side of the house, and the pattern's where there is one."""
+        """Import the engine's side of the house and its deck, and the pattern's if there is one."""
         registry.engine_of(scenario).load_session(scenario)
+        environment(scenario.engine.name).get_template("deck.in.j2")
         if scenario.takes_step_of_bed:
             importlib.import_module("sandmould.engines.bed_limit")
         if scenario.pattern is not None:

@@ -13,7 +13,6 @@ from typing import Any
 
 import numpy as np
 import yaml
-from numpy.typing import NDArray
 
 from sandmould import SHIPPED
 from sandmould.scenario.box import Tube
@@ -75,12 +74,10 @@ def _in_range(tube: Tube, hardness: Hardness) -> bool:
 
 def _at(velocity_m_s: float, in_modes: float) -> float:
     """Fill between the points of the map, along the logarithms; NaN beyond them."""
-    from scipy.interpolate import RegularGridInterpolator
-
-    points = [np.log(_map()[axis]) for axis in ("velocity_m_s", "in_modes")]
-    fill: NDArray[np.float64] = np.array(_map()["fill"], dtype=np.float64)
-    between = RegularGridInterpolator(points, fill, bounds_error=False)
-    return float(between(np.log([[velocity_m_s, in_modes]]))[0])
+    modes, speeds = np.log(_map()["in_modes"]), np.log(_map()["velocity_m_s"])
+    at_mode = np.log(in_modes)
+    at_speeds = [np.interp(at_mode, modes, row, np.nan, np.nan) for row in _map()["fill"]]
+    return float(np.interp(np.log(velocity_m_s), speeds, at_speeds, np.nan, np.nan))
 
 
 @functools.cache

@@ -333,15 +333,26 @@ def announce(
     BadInputError
         When the results cannot be written, or as of ``measure_speeds``.
     """
+    write_files(plan, results)
+    if measure == "all" or (measure == "engines" and plan.kind.planning.program is None):
+        measure_speeds(plan, results)
+    title = plan.study.study.title or plan.study.name
+    return f"\n{title}\n{price(plan, results, cores)}"
+
+
+def write_files(plan: Plan, results: Path) -> None:
+    """Write the plan to disk, what differs of it.
+
+    Raises
+    ------
+    BadInputError
+        When the results cannot be written.
+    """
     folder = results / plan.study.name
     with writing(folder):
         write_owner(plan.study.path, folder)
         write_plan([*plan.fills, *plan.runs], folder)
         write_study(plan.study.study, folder)
-    if measure == "all" or (measure == "engines" and plan.kind.planning.program is None):
-        measure_speeds(plan, results)
-    title = plan.study.study.title or plan.study.name
-    return f"\n{title}\n{price(plan, results, cores)}"
 
 
 def prepare(

@@ -8,7 +8,7 @@ from datetime import UTC, datetime
 from enum import IntEnum
 from pathlib import Path
 
-from sandmould.definition.run import FILL, LAST_MEASURED, Run
+from sandmould.definition.run import FILL, Run
 from sandmould.kinds.registry import kind_of
 from sandmould.plain_file import UNREADABLE
 from sandmould.runs.checkpoint_folders import END_CHECKPOINT, read_mark
@@ -18,17 +18,14 @@ from sandmould.runs.manifest import (
     LEFT_OUT,
     MANIFEST_FILE,
     MEASURED_BY,
-    OLDER_COST,
     Manifest,
     damage,
     deck_damage,
     read_manifest,
-    read_origin,
 )
 from sandmould.runs.outcome import Outcome, RunOutcome
 
 LISTED = 12
-_OF_ANY_COMPUTED = (OLDER_COST, "series.tsv")
 
 
 class Need(IntEnum):
@@ -75,12 +72,12 @@ def lack_of(run: Run, folder: Path, template_hash: Callable[[Run], str] | None =
     except UNREADABLE:
         return Lack(Need.COMPUTE, "outcome.json cannot be read")
     try:
-        origin = read_origin(folder)
+        manifest = read_manifest(folder)
+        origin = manifest["origin"]
         if origin["scenario_sha256"] != scenario_hash(run.scenario):
             return Lack(Need.COMPUTE, "it is of another scenario")
         if origin["template_sha256"] != wanted(run):
             return Lack(Need.COMPUTE, "its deck or its solver has changed since")
-        manifest = read_manifest(folder)
     except FileNotFoundError:
         return Lack(Need.COMPUTE, f"{MANIFEST_FILE} is missing")
     except UNREADABLE:
@@ -102,21 +99,15 @@ def _lack_of_end(fill: Run, folder: Path) -> Lack:
     return WHOLE
 
 
-def _lack_of_files(run: Run, folder: Path, manifest: Manifest | None) -> Lack:
-    """What is lost of the files of a run that ended; a run of older times has no manifest."""
-    sizes = (manifest or {}).get("computed")
-    why = deck_damage(folder, manifest or {}) or (
-        _empty(folder, _OF_ANY_COMPUTED) if sizes is None else damage(folder, sizes)
-    )
-    if why:
+def _lack_of_files(run: Run, folder: Path, manifest: Manifest) -> Lack:
+    """What is lost of the files of a run that ended."""
+    if why := deck_damage(folder, manifest) or damage(folder, manifest.get("computed", {})):
         return Lack(Need.COMPUTE, why)
-    if manifest is None:
-        why = _empty(folder, (LAST_MEASURED,))
-    elif "measured" not in manifest:
+    if "measured" not in manifest:
         why = "computed, but its measures are not taken yet"
     else:
         why = damage(folder, manifest["measured"]) or _measured_otherwise(run, manifest)
-    if why and manifest and LEFT_OUT in manifest:
+    if why and LEFT_OUT in manifest:
         return Lack(Need.COMPUTE, f"{why}, and its snapshots were left out of a pack")
     return Lack(Need.MEASURE, why) if why else WHOLE
 
@@ -127,15 +118,6 @@ def _measured_otherwise(run: Run, manifest: Manifest) -> str:
     if LEFT_OUT in manifest or code == kind_of(run.scenario).planning.measuring_hash:
         return ""
     return "our code measures otherwise since"
-
-
-def _empty(folder: Path, names: Iterable[str]) -> str:
-    """Say which of some files is missing or empty."""
-    for name in names:
-        path = folder / name
-        if not path.is_file() or not path.stat().st_size:
-            return f"{name} is missing or empty"
-    return ""
 
 
 def _template_hash(run: Run) -> str:

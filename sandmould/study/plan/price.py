@@ -15,7 +15,7 @@ from sandmould.kinds.kind import CORE_SECONDS, SpeedClass
 from sandmould.kinds.registry import kind_of
 from sandmould.plain_file import UNREADABLE
 from sandmould.runs.columns import WALL_S
-from sandmould.runs.manifest import read_cost
+from sandmould.runs.manifest import read_manifest
 from sandmould.runs.outcome import Outcome, RunOutcome
 from sandmould.study.plan.batches import START_S
 from sandmould.study.plan.fills import beside_s, own_work, predicted_s
@@ -123,5 +123,5 @@ def computed_wall_s(folder: Path) -> float:
     """Wall time that a finished run's computation took; NaN where it failed or none is written."""
     with contextlib.suppress(*UNREADABLE):
         if RunOutcome.read(folder / "outcome.json").outcome is Outcome.FINISHED:
-            return float(read_cost(folder)[WALL_S])
+            return float(read_manifest(folder)["cost"][WALL_S])
     return math.nan

@@ -92,7 +92,7 @@ def test_results_that_are_damaged(elsewhere: Path) -> None:
     (planned,) = open_plan(Path("bar.yaml")).runs
     run = write_run(planned, Path("results", "bar"))
     of_study = [Path("results", "bar", name) for name in ("runs.tsv", "study.yaml", "summary.tsv")]
-    of_run = [run / name for name in ("outcome.json", "cost.tsv", "scenario.yaml")]
+    of_run = [run / name for name in ("outcome.json", "products.json", "scenario.yaml")]
     (run / "work").mkdir()
     for path in (*of_study, *of_run, run / "work" / "progress.json"):
         before = path.read_bytes() if path.exists() else None

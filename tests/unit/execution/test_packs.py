@@ -15,7 +15,7 @@ import pytest
 
 from sandmould.bad_input import BadInputError
 from sandmould.definition.run import Run
-from sandmould.digest import digest
+from sandmould.digest import digest, file_digest
 from sandmould.engines.snapshot import Snapshot
 from sandmould.engines.snapshot_file import SNAPSHOTS, SnapshotFile, stored_snapshots
 from sandmould.execution.packs import recorded
@@ -92,7 +92,7 @@ def test_a_run_that_a_start_would_compute_again_gives_way_and_others_stay(packed
     unpack(packed, RESULTS)
     plan = open_plan(Path("two.yaml"))
     older, begun = run_folder(plan, 0), run_folder(plan, 1)
-    manifest = read_manifest(older) or {}
+    manifest = read_manifest(older)
     manifest["origin"]["template_sha256"] = "of an older solver"
     save_manifest(older, manifest)
     (older / "notes.txt").write_text("mine")
@@ -126,8 +126,9 @@ def test_the_last_state_alone_is_whole_but_cannot_be_measured_again(
             np.zeros((2, 2)), np.zeros((2, 2)), np.zeros((2, 3)), np.ones(2),
         ))  # fmt: skip
     file.close()
-    manifest = read_manifest(folder) or {}
+    manifest = read_manifest(folder)
     manifest["computed"][SNAPSHOTS] = (folder / SNAPSHOTS).stat().st_size
+    manifest["sha256"][SNAPSHOTS] = file_digest(folder / SNAPSHOTS)
     save_manifest(folder, manifest)
     pack(plan, RESULTS, last_state=True)
     shutil.rmtree(RESULTS)

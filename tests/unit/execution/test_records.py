@@ -18,6 +18,7 @@ from sandmould.engines.snapshot import Snapshot
 from sandmould.execution import records
 from sandmould.kinds.sand.exports import write_exports, write_picture
 from sandmould.kinds.sand.measure import write_measures, write_profile
+from sandmould.runs.manifest import save_manifest
 from sandmould.study.plan.expand import expand
 from sandmould.study.plan.load_study import open_study
 from sandmould.study.plan.plan_files import read_run
@@ -188,7 +189,7 @@ def test_record_of_a_study_that_compares_keeps_its_agreement_and_engines(
     first = folder / "runs" / runs[0].run
     first.mkdir(parents=True)
     said = {"commit": "abc1234", "versions": {}, "machine": {}}
-    (first / "provenance.json").write_text(json.dumps(said))
+    save_manifest(first, {"origin": said})
     rows = [{"run": r.run, "engine": r.scenario.engine.name, "version": "7", "outcome_code": 0,
              "outcome": "finished", "wall_s": 2.0, "grain_steps": 1e6, "grain_steps_per_s": 5e5}
             for r in runs]  # fmt: skip

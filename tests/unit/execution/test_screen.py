@@ -22,6 +22,7 @@ from sandmould.execution.screen.table import counts_text, study_table
 from sandmould.execution.screen.view import RunView, StudyView
 from sandmould.kinds.sand.speed import SandSpeed
 from sandmould.runs import words
+from sandmould.runs.manifest import save_manifest
 from sandmould.runs.outcome import Outcome, RunOutcome
 from sandmould.study.plan.build_plan import Plan, open_plan
 from tests.planned import announce
@@ -126,7 +127,7 @@ def end(run: str, fill: float, outcome: Outcome = Outcome.FINISHED, wall_s: floa
     (folder / "measures.tsv").write_text(
         f"time_s\tvibration_time_s\tstage\t{FILL}\n1.0\t1.0\tvibrate_1\t{fill}\n"
     )
-    (folder / "cost.tsv").write_text(f"wall_s\tcpu_s\n{wall_s}\t{wall_s}\n")
+    save_manifest(folder, {"cost": {"wall_s": wall_s, "cpu_s": wall_s}})
 
 
 def test_plain_lines_tell_each_run_once(plan: Plan, capsys: pytest.CaptureFixture[str]) -> None:

@@ -12,12 +12,14 @@ import pytest
 import yaml
 
 from sandmould.engines.registry import deck_hash
+from sandmould.execution.settled import is_settled, note_settled
 from sandmould.execution.status import run_status, status_text
 from sandmould.kinds.sand.kind import SAND
 from sandmould.runs.claim import CLAIM_FILE
 from sandmould.runs.hashing import scenario_hash
+from sandmould.runs.manifest import write_manifest
 from sandmould.runs.outcome import Outcome, RunOutcome
-from sandmould.study.plan.build_plan import Plan, open_plan
+from sandmould.study.plan.build_plan import RESULTS, Plan, open_plan
 from sandmould.study.plan.lacking import Lack, Need
 from tests.planned import write_plan
 
@@ -47,10 +49,12 @@ def ended(plan: Plan, place: int, outcome: Outcome, wall_s: float) -> None:
         (folder / name).write_text("so\n")
     origin = {"scenario_sha256": scenario_hash(run.scenario),
               "template_sha256": deck_hash(run.scenario)}  # fmt: skip
-    (folder / "provenance.json").write_text(json.dumps(origin))
     RunOutcome(outcome, "why it is so", 1.0, 1.0).write(folder / "outcome.json")
     steps = SAND.planning.planned_work(run.scenario)
-    (folder / "cost.tsv").write_text(f"wall_s\tcpu_s\tgrain_steps\n{wall_s}\t{wall_s}\t{steps}\n")
+    cost = {"wall_s": wall_s, "cpu_s": wall_s, "grain_steps": steps}
+    write_manifest(folder, "computed", {"series.tsv": 3}, origin, cost)
+    code = SAND.planning.measuring_hash
+    write_manifest(folder, "measured", {"measures.tsv": 3}, code=code)
 
 
 def begun(plan: Plan, place: int, ago_s: float) -> Path:
@@ -138,13 +142,34 @@ def test_a_finished_study_has_nothing_left(plan: Plan) -> None:
     assert said == "trial: 6 done of 6 runs\nprocessor time so far: 6.0 min; nothing left"
 
 
+def test_a_study_is_settled_until_a_file_that_snakemake_looks_at_changes(plan: Plan) -> None:
+    for place in range(6):
+        ended(plan, place, Outcome.FINISHED, 60.0)
+    assert not is_settled(plan, RESULTS)
+    note_settled(plan, RESULTS)
+    assert not is_settled(plan, RESULTS)  # the plan was not written whole
+    note_settled(plan, RESULTS)
+    assert is_settled(plan, RESULTS)
+    folder = RESULTS / "trial"
+    (folder / "spent_s.txt").write_text("1.0\n")
+    assert is_settled(plan, RESULTS)
+    for name in ("summary.tsv", f"runs/{plan.runs[0].run}/outcome.json", "runs.tsv"):
+        (folder / name).touch()
+        assert not is_settled(plan, RESULTS)
+        note_settled(plan, RESULTS)
+        assert is_settled(plan, RESULTS)
+    (folder / "runs" / plan.runs[0].run / "series.tsv").unlink()
+    note_settled(plan, RESULTS)
+    assert not is_settled(plan, RESULTS)
+
+
 def test_broken_files_count_as_not_there(plan: Plan) -> None:
     ended(plan, 0, Outcome.FINISHED, 60.0)
     run = plan.runs[0].run
-    (Path("results/trial/runs") / run / "cost.tsv").write_text("")
+    (Path("results/trial/runs") / run / "series.tsv").write_text("")
     said = status_text(plan, Path("results"), 2).splitlines()
     assert said[0] == "trial: 6 waiting of 6 runs"
-    assert said[2:] == [f"  waiting: {run}  cost.tsv is missing or empty"]
+    assert said[2:] == [f"  waiting: {run}  series.tsv has 0 of 3 bytes"]
     progress = begun(plan, 1, ago_s=0.0) / "work" / "progress.json"
     progress.write_text("{")
     assert run_status(progress.parents[1], Lack(Need.COMPUTE)).state == "waiting"

@@ -14,6 +14,7 @@ from sandmould.kinds.deck.kind import DECK
 from sandmould.kinds.deck.own.deck import check_unchanged, render
 from sandmould.kinds.deck.own.thermo import read_thermo
 from sandmould.report.page import write_report
+from sandmould.runs.manifest import save_manifest
 from sandmould.runs.outcome import Outcome
 from sandmould.scenario.own_deck import OwnDeck
 from sandmould.study.collect import collect
@@ -283,7 +284,8 @@ def test_runs_are_collected_and_reported(tmp_path: Path) -> None:
             '{"code": 0, "detail": "gone on from restart.a at step 5", "simulated_s": 1.0, '
             '"planned_s": 0.0}'
         )
-        (of_run / "cost.tsv").write_text("engine\tversion\tranks\tcpu_s\nlammps\t1\t1\t9\n")
+        cost = {"engine": "lammps", "version": "1", "ranks": 1, "cpu_s": 9.0}
+        save_manifest(of_run, {"cost": cost})
         DECK.execution.measure(run, of_run)
         DECK.execution.export(run, of_run)
         assert (of_run / "final.png").stat().st_size > 5000

@@ -2,12 +2,10 @@
 
 from __future__ import annotations
 
-import json
 import re
 from pathlib import Path
 
 import numpy as np
-import pandas as pd
 import pytest
 
 from sandmould.definition.run import Run
@@ -15,6 +13,7 @@ from sandmould.engines.durations import cost_before
 from sandmould.engines.snapshot import Snapshot
 from sandmould.kinds.sand.measure import write_measures
 from sandmould.report.page import write_report
+from sandmould.runs.manifest import read_manifest, save_manifest
 from sandmould.runs.outcome import Outcome, RunOutcome
 from sandmould.scenario.box import Box, Plate
 from sandmould.scenario.discharge import Discharge
@@ -82,8 +81,7 @@ def write_planted(folder: Path, points: dict[tuple[float, float], float], extra:
         write_measures(read_run(place / "scenario.yaml").scenario, place, place / "measures.tsv")
         RunOutcome(Outcome.FINISHED, "", 2.0, 2.0).write(place / "outcome.json")
         cost = {**cost_before(run.scenario).row(), "cpu_s": 3.5, "grain_steps_per_s": 1e6}
-        pd.DataFrame([cost]).to_csv(place / "cost.tsv", sep="\t", index=False)
-        (place / "provenance.json").write_text(json.dumps({"commit": "abc"}))
+        save_manifest(place, {"cost": cost, "origin": {"commit": "abc"}})
     collect(folder)
     return folder
 
@@ -108,8 +106,8 @@ def test_one_run_has_no_interval_and_a_failed_one_no_say_in_what_is_typical(
     place = folder / "runs" / "f0p5_a0p1_r2"
     RunOutcome(Outcome.UNSTABLE, "", 0.1, 2.0).write(place / "outcome.json")
     for run, grains in ((folder / "runs" / "f0p5_a0p1_r1", 400), (place, 100)):
-        cost = pd.read_csv(run / "cost.tsv", sep="\t").assign(grains=grains)
-        cost.to_csv(run / "cost.tsv", sep="\t", index=False)
+        manifest = read_manifest(run)
+        save_manifest(run, manifest | {"cost": manifest["cost"] | {"grains": grains}})
     collect(folder)
     write_report(folder, folder / "report.html")
     text = (folder / "report.html").read_text(encoding="utf-8")

@@ -20,6 +20,7 @@ from sandmould.definition.run import RUN_NAME
 from sandmould.drawing.figure_files import strip
 from sandmould.report.page import write_report
 from sandmould.runs.columns import RUN
+from sandmould.runs.manifest import save_manifest
 from sandmould.study.collect import collect
 from sandmould.study.plan.expand import expand
 from sandmould.study.plan.load_study import open_study
@@ -89,7 +90,8 @@ def study_of(folder: Path, names: dict[str, str]) -> Path:
         pd.DataFrame(clock | curve).to_csv(of_run / "measures.tsv", sep="\t", index=False)
         outcome = {"code": 0, "detail": names["detail"], "simulated_s": 1.0, "planned_s": 0.0}
         (of_run / "outcome.json").write_text(yaml.safe_dump(outcome, default_flow_style=True))
-        (of_run / "cost.tsv").write_text("engine\tversion\tranks\tcpu_s\nlammps\t1\t1\t9\n")
+        cost = {"engine": "lammps", "version": "1", "ranks": 1, "cpu_s": 9.0}
+        save_manifest(of_run, {"cost": cost})
     collect(results)
     write_report(results, results / "report.html")
     return results

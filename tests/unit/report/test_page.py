@@ -238,7 +238,7 @@ def test_broken_files_are_survived(tmp_path: Path) -> None:
     study = write_study(tmp_path / "broken")
     (study / "runs" / "f50_r2" / "snapshots" / "000005.npz").write_bytes(b"PK\x03\x04 cut short")
     (study / "runs" / "f25_r1" / "scenario.yaml").write_text("scenario: [")
-    (study / "runs" / "f25_r2" / "provenance.json").write_text("{")
+    (study / "runs" / "f25_r2" / "products.json").write_text("{")
     (study / "runs" / "f25_r3" / "measures.tsv").write_text("time_s\n1\n")
     text = report(study)
     assert "measures.tsv cannot be read" in text

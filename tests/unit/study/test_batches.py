@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import errno
-import json
 import os
 import signal
 from collections.abc import Callable
@@ -21,7 +20,7 @@ from sandmould.execution.pool import End
 from sandmould.execution.simulate import RESTARTABLE_EXIT
 from sandmould.kinds.registry import kind_of
 from sandmould.runs.hashing import scenario_hash
-from sandmould.runs.manifest import write_manifest
+from sandmould.runs.manifest import read_manifest, save_manifest, write_manifest
 from sandmould.runs.outcome import Outcome, RunOutcome
 from sandmould.study.plan.batches import START_S, alone, is_done, plan_batches, planned_wall_s
 from sandmould.study.plan.build_plan import Plan
@@ -152,8 +151,7 @@ class Jobs:
         self.computed.append(folder.name)
         origin = {"scenario_sha256": scenario_hash(run.scenario),
                   "template_sha256": deck_hash(run.scenario)}  # fmt: skip
-        (folder / "provenance.json").write_text(json.dumps(origin))
-        write_manifest(folder, "computed", {})
+        write_manifest(folder, "computed", {}, origin)
         RunOutcome(Outcome.FINISHED, "", 1.0, 1.0).write(folder / "outcome.json")
         return 0
 
@@ -258,9 +256,9 @@ def test_a_changed_scenario_or_solver_is_computed_again(
     done = Jobs(monkeypatch)
     compute_all([folder], tmp_path / "log")
     assert lack_of(run, folder) == WHOLE
-    origin = json.loads((folder / "provenance.json").read_text())
+    manifest = read_manifest(folder)
     for key in ("scenario_sha256", "template_sha256"):
-        (folder / "provenance.json").write_text(json.dumps(origin | {key: "another"}))
+        save_manifest(folder, manifest | {"origin": manifest["origin"] | {key: "another"}})
         assert lack_of(run, folder).need is Need.COMPUTE
     compute_all([folder], tmp_path / "log")
     assert done.computed == done.measured == [folder.name] * 2

@@ -83,7 +83,7 @@ def test_failed_run_has_gaps_and_says_why(study: Path) -> None:
 
 
 def test_missing_files_are_gaps(study: Path) -> None:
-    for name in ("outcome.json", "cost.tsv", "measures.tsv"):
+    for name in ("outcome.json", "products.json", "measures.tsv"):
         (study / "runs" / "f25_r1" / name).unlink()
     row = gather(study).summary.set_index("run").loc["f25_r1"]
     assert row["outcome"] == NO_OUTCOME
@@ -97,7 +97,7 @@ def test_missing_files_are_gaps(study: Path) -> None:
         ("outcome.json", "{"),
         ("outcome.json", '{"code": 7, "detail": "", "simulated_s": 1, "planned_s": 1}'),
         ("outcome.json", "[]"),
-        ("cost.tsv", ""),
+        ("products.json", ""),
         ("measures.tsv", "time_s\tstage\n1\tsettle\n"),
         ("measures.tsv", "time_s\tvibration_time_s\tstage\nsoon\t1\tsettle\n"),
     ],
@@ -227,7 +227,7 @@ def test_what_is_read_back_is_what_was_gathered(study: Path) -> None:
     for run, detail in told.items():
         RunOutcome(Outcome.FINISHED, detail, 1.0 / 3.0, 2.0).write(runs / run / "outcome.json")
     (runs / "f50_r2" / "outcome.json").unlink()
-    (runs / "f50_r3" / "cost.tsv").unlink()
+    (runs / "f50_r3" / "products.json").unlink()
     gathered = gather(study)
     collect(study)
     found = read_collected(study)

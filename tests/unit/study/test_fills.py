@@ -17,6 +17,7 @@ from sandmould.kinds.sand.kind import SAND
 from sandmould.report.tables import key_numbers
 from sandmould.runs.columns import CPU_S, FILL_CPU_S, FILL_WALL_S, total_s
 from sandmould.runs.formatting import size_text
+from sandmould.runs.manifest import save_manifest
 from sandmould.study.collect import shares_of_fills
 from sandmould.study.plan.build_plan import Plan, announce, open_plan, prepare
 from sandmould.study.plan.expand import expand
@@ -151,7 +152,7 @@ def test_each_run_bears_its_part_of_a_fill(tmp_path: Path) -> None:
     for fill, cost in {"fill_a": 8.0, "fill_b": 3.0}.items():
         folder = tmp_path / "fills" / fill
         folder.mkdir(parents=True)
-        (folder / "cost.tsv").write_text(f"wall_s\tcpu_s\n{2 * cost}\t{cost}\n")
+        save_manifest(folder, {"cost": {"wall_s": 2 * cost, "cpu_s": cost}})
     fills = pd.Series(["fill_a", "fill_a", "fill_b", "fill_lost", None])
     table = pd.DataFrame({CPU_S: [1.0] * 5}).assign(**shares_of_fills(fills, tmp_path))
     assert table[FILL_CPU_S].fillna(-1).tolist() == [4.0, 4.0, 3.0, -1.0, -1.0]

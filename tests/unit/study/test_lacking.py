@@ -8,13 +8,11 @@ import shutil
 from collections.abc import Callable
 from pathlib import Path
 
-import pandas as pd
 import pytest
 
 from sandmould.execution.simulate import measure_run
 from sandmould.execution.status import run_status, status_text
-from sandmould.runs.manifest import LEFT_OUT, MANIFEST_FILE, OLDER_COST, OLDER_ORIGIN
-from sandmould.runs.run_tables import read_costs
+from sandmould.runs.manifest import LEFT_OUT, MANIFEST_FILE
 from sandmould.study.plan.build_plan import RESULTS, Plan, open_plan, prepare
 from sandmould.study.plan.lacking import WHOLE, Lack, Need, lack_of, notes_of
 from tests.finished_study import finished_study, study_text
@@ -121,20 +119,6 @@ def test_what_is_no_damage_computes_nothing(harmless: Callable[[Path], None], pl
     harmless(folder_of(plan))
     assert plan.lacks(RESULTS) == {}
     assert prepare(plan, RESULTS) == ""
-
-
-def test_a_run_of_older_times_needs_its_files_to_be_there(plan: Plan) -> None:
-    folder = folder_of(plan)
-    tree = json.loads((folder / MANIFEST_FILE).read_text())
-    (folder / OLDER_ORIGIN).write_text(json.dumps(tree["origin"]))
-    pd.DataFrame([tree["cost"]]).to_csv(folder / OLDER_COST, sep="\t", index=False)
-    (folder / MANIFEST_FILE).unlink()
-    assert lack(plan) == WHOLE
-    assert read_costs([folder]).rows["engine"][0] == tree["cost"]["engine"]
-    (folder / "measures.tsv").write_bytes(b"")
-    assert lack(plan) == Lack(Need.MEASURE, "measures.tsv is missing or empty")
-    (folder / "series.tsv").unlink()
-    assert lack(plan) == Lack(Need.COMPUTE, "series.tsv is missing or empty")
 
 
 def test_a_killed_measurement_is_done_again(plan: Plan) -> None:
@@ -249,15 +233,11 @@ def test_whatever_is_damaged_is_found_by_its_hash(file: str, plan: Plan) -> None
         os.rename("kept", folder)
 
 
-def test_of_a_run_without_hashes_sizes_alone_are_known(plan: Plan) -> None:
+def test_what_is_lost_of_the_hashes_is_seen(plan: Plan) -> None:
     path = folder_of(plan) / MANIFEST_FILE
     tree = json.loads(path.read_text())
-    path.write_text(json.dumps({k: v for k, v in tree.items() if k not in ("sha256", "seal")}))
-    assert lack(plan) == WHOLE
-    assert "1 of them are of an older version: only sizes" in status_text(plan, RESULTS, 1, True)
-    # What is lost of the hashes alone is no older version.
-    for key in ("sha256", "seal"):
-        path.write_text(json.dumps({k: v for k, v in tree.items() if k != key}))
+    for keys in (("sha256",), ("seal",), ("sha256", "seal")):
+        path.write_text(json.dumps({k: v for k, v in tree.items() if k not in keys}))
         assert f"{MANIFEST_FILE} is not as the run wrote it" in status_text(plan, RESULTS, 1, True)
 
 

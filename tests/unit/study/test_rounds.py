@@ -15,6 +15,7 @@ import yaml
 from sandmould.bad_input import BadInputError
 from sandmould.definition.certificate import SEEDS
 from sandmould.execution import run_study
+from sandmould.runs.manifest import save_manifest
 from sandmould.statistics.emulator import TooFewRunsError
 from sandmould.statistics.optimum import Optimum, find_optimum
 from sandmould.statistics.propose import NEAR, propose
@@ -284,7 +285,7 @@ def test_one_command_drives_all_rounds(tmp_path: Path, monkeypatch: pytest.Monke
             (folder / "measures.tsv").write_text(
                 f"time_s\tvibration_time_s\tstage\t{FILL}\n1.0\t1.0\tvibrate_1\t{value}\n"
             )
-            (folder / "cost.tsv").write_text("cpu_s\n60.0\n")
+            save_manifest(folder, {"cost": {"cpu_s": 60.0}})
         collect(Path("results/trial"))
         return 0
 
