@@ -165,8 +165,8 @@ def _by_trimesh(path: Path) -> tuple[Array, Triangles]:
 
     try:
         scene = trimesh.load_scene(path, process=False)
-        told = tells_unit(path)
-        unit_m = trimesh.units.unit_conversion(scene.units, "meters") if told else 1.0
+        unit = scene.units if tells_unit(path) else None
+        unit_m = trimesh.units.unit_conversion(unit, "meters") if unit else 1.0
         mesh = scene.to_mesh()
         points = unit_m * np.asarray(mesh.vertices, dtype=np.float64).reshape(-1, 3)
         cells = np.asarray(mesh.faces, dtype=np.int64).reshape(-1, 3)
