@@ -352,13 +352,19 @@ def export(
 
 
 @app.command(epilog="Example: sandmould report my_study.yaml")
-def report(study: StudyFile) -> None:
+def report(
+    study: StudyFile,
+    xlsx: Annotated[
+        bool,
+        typer.Option("--xlsx", help="Write report.xlsx too: settings and runs in mm, Hz, g, °C."),
+    ] = False,
+) -> None:
     """Write the report of a study again from its results."""
     from sandmould.execution.screen.ending import last_line
     from sandmould.report.page import write_report
     from sandmould.study.plan.build_plan import RESULTS
     from sandmould.study.plan.ownership import check_owner
-    from sandmould.study.plan.plan_files import SUMMARY
+    from sandmould.study.plan.plan_files import SPREADSHEET, SUMMARY
 
     folder = RESULTS / study.stem
     check_owner(study, folder)
@@ -370,6 +376,10 @@ def report(study: StudyFile) -> None:
         raise BadInputError([Problem("results", str(folder), valid)])
     page = folder / "report.html"
     try:
+        if xlsx:
+            from sandmould.report.spreadsheet import write_spreadsheet
+
+            write_spreadsheet(folder, folder / SPREADSHEET)
         write_report(folder, page)
     except (ValueError, FileNotFoundError) as error:
         valid = f"a folder of results that can be read ({error})"

@@ -11,18 +11,19 @@ from sandmould.drawing.figure_files import pictures, strip
 from sandmould.report.bed_mode import bed_mode
 from sandmould.report.drive import drive_of
 from sandmould.report.filling import FillingPages, filling_pages
-from sandmould.report.kinds.kind import Findings, KindPages, KindReport
+from sandmould.report.kinds.kind import Findings, FirstPicture, KindPages, KindReport
 from sandmould.report.loose_sand import loose_sand_pages
 from sandmould.report.method import measured_when, sand_method
 from sandmould.report.repose_figures import steepest_heaps
 from sandmould.report.robustness import robustness_pages
 from sandmould.report.sand import sand_pages
 from sandmould.report.time_series import curve_figures
-from sandmould.runs.columns import LEAST_LIMIT_S, OVERLAP_P99_FRACTION, TIME_STEP_S, finished
-from sandmould.runs.formatting import number
+from sandmould.runs.columns import LEAST_LIMIT_S, OVERLAP_P99_FRACTION, RUN, TIME_STEP_S, finished
+from sandmould.runs.formatting import number, setting_text
 from sandmould.runs.templates import worded
 from sandmould.scenario.hardness import DEEP_OVERLAP, LEAST_KAPPA, bed_hardness
 from sandmould.scenario.scenario import Scenario
+from sandmould.statistics.verdict import Verdict
 from sandmould.study.collect import Collected
 from sandmould.wording.answer import sand_limits
 from sandmould.wording.grounds import sand_grounds
@@ -66,10 +67,25 @@ def _pages(findings: Findings[Scenario], film_budget_bytes: int) -> KindPages:
             "filling": filling,
         },
         _sand_figures(pages, filling, bending, loose is not None),
+        _first_picture(pages, verdict, of_sweep),
         pages["beside"],
         grounds=sand_grounds(scenario, study, verdict, findings.scenarios),
         warning=_softness(scenario, of_sweep.summary),
     )
+
+
+def _first_picture(
+    pages: dict[str, Any], verdict: Verdict, collected: Collected
+) -> FirstPicture | None:
+    """The sand at its end; None without a snapshot."""
+    if not pages["panels"]:
+        return None
+    last = pages["panels"][-1]
+    of_run = collected.summary[collected.summary[RUN] == pages["pictured_run"]]
+    setting = setting_text({key: of_run.iloc[0][key] for key in collected.keys})
+    said = f"the sand coloured by layer of fill, {last['heading']}."
+    caption = f"{setting}: {said}" if setting else said.capitalize()
+    return FirstPicture(last["by_layer"], last["alt"], caption)
 
 
 def _steps_above_limit(summary: pd.DataFrame) -> tuple[str, ...]:
@@ -111,7 +127,7 @@ def _sand_figures(
     files: dict[str, Chart | bytes] = {}
     panels = pages["panels"]
     if panels:
-        files["sand"] = strip([(panel["heading"], panel["by_layer"]) for panel in panels])
+        files["sand"] = strip(pages["moments"])
     if panels and has_loose:
         files["density"] = strip([(panel["heading"], panel["by_density"]) for panel in panels])
     if filling:

@@ -16,12 +16,14 @@ from matplotlib.figure import Figure
 
 from sandmould.analysis.freezing import freezing
 from sandmould.analysis.freezing_plots import draw_freezing, draw_temperature
+from sandmould.arrays import Floats
+from sandmould.casting.arpm.scene import solids_of
 from sandmould.definition.sweep import Point
 from sandmould.drawing.chart import Chart, Mark, tints
 from sandmould.drawing.figure_files import numbered, pictures
 from sandmould.drawing.figures import png
 from sandmould.kinds.solidification.kind import SolidificationStudy
-from sandmould.report.kinds.kind import Findings, KindPages, KindReport
+from sandmould.report.kinds.kind import Findings, FirstPicture, KindPages, KindReport
 from sandmould.report.method import Row
 from sandmould.report.tables import Cell, Column, Table
 from sandmould.report.time_series import curve_figures, measure_curves
@@ -69,7 +71,7 @@ def _pages(findings: Findings[Solidification], film_budget_bytes: int) -> KindPa
     folder = findings.study_folder / "runs" / run
     probes = [f"{probe.name}_k" for probe in scenario.probes]
     curves = measure_curves(collected, verdict, [*probes, "solidified_fraction"])
-    fields, sentences, spots = _fields(folder, scenario)
+    fields, first, sentences, spots = _fields(folder, scenario)
     errors = _errors(reference, scenario, collected) if reference else []
     error_cost = _error_charts(errors)
     stand_ins = _stand_ins(findings.answer.stand_ins)
@@ -92,6 +94,7 @@ def _pages(findings: Findings[Solidification], film_budget_bytes: int) -> KindPa
             **numbered("error_cost", error_cost),
             **curve_figures(curves),
         },
+        picture=first,
         answer="" if study.seeks_best else _cheapest(errors, reference, collected),
         grounds=notes(
             "casting_grounds.j2",
@@ -144,20 +147,33 @@ def _of_point(summary: pd.DataFrame, reference: Point) -> pd.DataFrame:
     return summary[chosen]
 
 
-def _fields(folder: Path, scenario: Solidification) -> tuple[str, tuple[str, ...], Table | None]:
-    """Picture of a run's fields, what it says in words, and its hot spots."""
+def _fields(
+    folder: Path, scenario: Solidification
+) -> tuple[str, FirstPicture | None, tuple[str, ...], Table | None]:
+    """Pictures of a run's fields, what they say in words, and its hot spots."""
     if not (folder / "fields.npz").is_file():
-        return "", ("No run has left fields.",), None
+        return "", None, ("No run has left fields.",), None
     with np.load(folder / "fields.npz", allow_pickle=False) as file:
         fields = dict(file)
     melts = fields["melts"]
     frozen = freezing(
         fields["position_m"][melts], fields["frozen_s"][melts], scenario.hot_spot_reach_m
     )
+    solids = solids_of(scenario)
+
+    def distance_m(places_m: Floats) -> Floats:
+        return np.min([solid.distance_m(places_m) for solid in solids], axis=0)
+
     figure = Figure(figsize=(11, 4.6), dpi=110, layout="constrained")
     left, right = figure.subplots(1, 2)
-    draw_freezing(fields, frozen, left)
-    draw_temperature(fields, frozen, right)
+    draw_freezing(fields, frozen, left, distance_m)
+    draw_temperature(fields, frozen, right, distance_m)
+    alone = Figure(figsize=(5.6, 4.6), dpi=110, layout="constrained")
+    draw_freezing(fields, frozen, alone.subplots(), distance_m)
+    alt = f"When each part of the casting froze in run {folder.name}, with its outline"
+    caption = "When each part of the casting froze, and the part as drawn (line)"
+    where = ", cut through the last point to freeze" if scenario.dimensions == 3 else ""
+    first = FirstPicture(png(alone), alt, f"{caption}{where}.")
     is_solid = math.isfinite(frozen.solidification_time_s)
     said = worded("frozen.j2", it=frozen, is_solid=is_solid)
     axes = [Column(f"{name}, mm") for name in "yz"[: scenario.dimensions - 1]]
@@ -166,7 +182,7 @@ def _fields(folder: Path, scenario: Solidification) -> tuple[str, tuple[str, ...
         tuple(Cell(number(v, 4), str(v)) for v in (*(1e3 * place), time_s))
         for place, time_s in zip(frozen.hot_spots_m, frozen.hot_spot_s, strict=True)
     )
-    return png(figure), (said,), Table(columns, rows, (False,) * len(rows))
+    return png(figure), first, (said,), Table(columns, rows, (False,) * len(rows))
 
 
 def _errors(point: Point, scenario: Solidification, collected: Collected) -> list[_Error]:
