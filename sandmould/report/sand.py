@@ -99,6 +99,7 @@ def sand_pages(
         "scene": figures.draw_dimensions(scenario, bed_m),
         "scene_alt": _scene_alt(scenario, bed_m),
         "pictured_run": run,
+        "height_m": height_m,
         "role": _role_text(next(iter(roles), ""), verdict, collected.summary),
         "panels": tuple(
             {

@@ -52,7 +52,7 @@ def _pages(findings: Findings[Scenario], film_budget_bytes: int) -> KindPages:
         from sandmould.report.bending import bending_pages  # scikit-fem: few studies need it
 
         bending = bending_pages(folder, href, scenario, of_sweep, verdict, run)
-    loose = loose_sand_pages(folder, run, of_sweep.summary, scenario)
+    loose = loose_sand_pages(folder, run, scenario, pages["height_m"])
     return KindPages(
         "sand.html",
         sand_method(scenario, collected.keys, collected.summary),
@@ -60,13 +60,16 @@ def _pages(findings: Findings[Scenario], film_budget_bytes: int) -> KindPages:
         {
             "pages": pages,
             "bending": bending,
+            "has_rigid": any(o.name != scenario.pattern.name for o in scenario.obstacles)
+            if scenario.pattern is not None
+            else bool(scenario.obstacles),
             "loose": loose,
             "dimension": scenario.dimension,
             "vibrates": bool(scenario.vibrations),
             "ends_at_rest": scenario.ends_at_rest,
             "filling": filling,
         },
-        _sand_figures(pages, filling, bending, loose is not None),
+        _sand_figures(pages, filling, bending, loose),
         _first_picture(pages, verdict, of_sweep),
         pages["beside"],
         grounds=sand_grounds(scenario, study, verdict, findings.scenarios),
@@ -82,9 +85,9 @@ def _first_picture(
         return None
     last = pages["panels"][-1]
     of_run = collected.summary[collected.summary[RUN] == pages["pictured_run"]]
-    setting = setting_text({key: of_run.iloc[0][key] for key in collected.keys})
+    values = {key: of_run.iloc[0][key] for key in collected.keys}
     said = f"the sand coloured by layer of fill, {last['heading']}."
-    caption = f"{setting}: {said}" if setting else said.capitalize()
+    caption = f"{setting_text(values)}: {said}" if values else said.capitalize()
     return FirstPicture(last["by_layer"], last["alt"], caption)
 
 
@@ -121,15 +124,16 @@ def _sand_figures(
     pages: dict[str, Any],
     filling: FillingPages | None,
     bending: dict[str, Any] | None,
-    has_loose: bool,
+    loose: dict[str, Any] | None,
 ) -> dict[str, Chart | bytes]:
     """The sand at its moments, the pattern, filling over what is swept, and over time."""
     files: dict[str, Chart | bytes] = {}
     panels = pages["panels"]
     if panels:
         files["sand"] = strip(pages["moments"])
-    if panels and has_loose:
+    if panels and loose:
         files["density"] = strip([(panel["heading"], panel["by_density"]) for panel in panels])
+        files |= pictures(loose=loose["picture"])
     if filling:
         files["filling"] = filling.chart
     if bending:
