@@ -14,8 +14,8 @@ Array = NDArray[np.float64]
 DistanceM = Callable[[Array], Array]
 """Signed distance of places (n, d) from the surface of what is cast, (n,) float64, m."""
 MOST_SPOTS = 12
-_INK = "#222222"
-_PLACES = 160
+_INK, _CAST, _SAND = "#222222", "#B9BEC4", "#F1E5CC"
+_PLACES = 240
 """Along each side of a picture, at which that distance is asked for to draw an outline."""
 
 
@@ -78,13 +78,44 @@ def _draw_outline(
     cut: Mapping[str, Array], axis: int, at_m: float, axes: Axes, distance_m: DistanceM
 ) -> None:
     """The part as it is drawn, over the elements that stand for it."""
-    low_m, high_m = cut["position_m"].min(axis=0), cut["position_m"].max(axis=0)
+    ends_m = cut["position_m"].min(axis=0), cut["position_m"].max(axis=0)
+    along_mm, outside_m = _section(*ends_m, axis, at_m, distance_m)
+    axes.contour(*along_mm, outside_m, [0.0], colors=_INK, linewidths=1)
+
+
+def draw_part(low_m: Array, high_m: Array, at_m: float, axes: Axes, distance_m: DistanceM) -> None:
+    """Draw what is cast in its box before anything runs, in 3D where a plane cuts it.
+
+    Parameters
+    ----------
+    low_m, high_m : (d,) float64, m
+        Corners of the box.
+    at_m : float, m
+        In 3D, y of the plane of x and z.
+    axes : Axes
+    distance_m : callable
+        As in :func:`draw_freezing`.
+    """
+    axis = 1 if len(low_m) == 3 else 2
+    kept = [each for each in range(len(low_m)) if each != axis]
+    at_m = at_m if axis == 1 else np.nan
+    along_mm, outside_m = _section(low_m[kept], high_m[kept], axis, at_m, distance_m)
+    axes.contourf(*along_mm, outside_m, [-np.inf, 0.0], colors=[_CAST])
+    axes.contour(*along_mm, outside_m, [0.0], colors=_INK, linewidths=1)
+    axes.set_facecolor(_SAND)
+    axes.set_aspect("equal")
+    _name_axes(axes, axis)
+
+
+def _section(
+    low_m: Array, high_m: Array, axis: int, at_m: float, distance_m: DistanceM
+) -> tuple[list[Array], Array]:
+    """Places along both axes of a plane, mm, and the distance from what is cast, m."""
     along = [np.linspace(*ends, _PLACES) for ends in zip(low_m, high_m, strict=True)]
     places_m = np.stack(np.meshgrid(*along), axis=-1).reshape(-1, 2)
     if np.isfinite(at_m):
         places_m = np.insert(places_m, axis, at_m, axis=1)
-    outside_m = distance_m(places_m).reshape(_PLACES, _PLACES)
-    axes.contour(*(1e3 * each for each in along), outside_m, [0.0], colors=_INK, linewidths=1)
+    return [1e3 * each for each in along], distance_m(places_m).reshape(_PLACES, _PLACES)
 
 
 def _cut(fields: Mapping[str, Array], freezing: Freezing) -> tuple[dict[str, Array], int, float]:
@@ -126,6 +157,10 @@ def _draw(
     )  # fmt: skip
     figure = axes.figure
     figure.colorbar(image, ax=axes, label=title, shrink=0.85)
+    _name_axes(axes, axis)
+
+
+def _name_axes(axes: Axes, axis: int) -> None:
     across, up = (name for place, name in enumerate("xyz") if place != axis)
     axes.set_xlabel(f"{across}, mm")
     axes.set_ylabel(f"{up}, mm")

@@ -317,12 +317,13 @@ def show(
         ),
     ] = None,
 ) -> None:  # fmt: skip
-    """Draw a scene of sand to scale before anything runs."""
+    """Draw a scene of sand, or a casting, to scale before anything runs."""
     from sandmould.report.scene_page import draw_scene_file
     from sandmould.study.plan.drawn_run import drawn_run
 
     opened, shown = drawn_run(study, run)
-    ending = "png" if shown.scenario.dimension == 2 else "html"
+    flat = "dimension" if opened.study.kind == "sand" else "dimensions"
+    ending = "png" if getattr(shown.scenario, flat) == 2 else "html"
     out = output or Path(f"{opened.name}_scene.{ending}")
     draw_scene_file(shown.scenario, opened.study.title or opened.name, shown.run, out)
     typer.echo(out)

@@ -11,6 +11,7 @@ from scipy.ndimage import distance_transform_edt
 
 from sandmould.analysis.loose_zones import LOOSE, LooseField
 from sandmould.drawing.figures import cut_m, panel
+from sandmould.drawing.sphere_scene import SurfaceField
 from sandmould.engines.snapshot import Snapshot
 from sandmould.scenario.scenario import Scenario
 
@@ -74,3 +75,17 @@ def draw_loose_field(
                     path_effects=[withStroke(linewidth=3.5, foreground="white")])  # fmt: skip
 
     return panel(last, scenario, height_m, draw)
+
+
+def on_surfaces(field: LooseField) -> SurfaceField:
+    """The same for the surfaces of the 3D view: what the sand next to them is like."""
+    grid = np.stack(np.indices(field.share.shape), axis=-1).reshape(-1, field.share.ndim)
+    return SurfaceField(
+        "density of the sand at it, at the end",
+        field.low_m + field.cell_m * grid,
+        field.share.ravel(),
+        LEAST,
+        MOST,
+        (f"{100 * LEAST:.0f} %", f"{100 * MOST:.0f} % of what is usual"),
+        field.cell_m,
+    )

@@ -40,7 +40,12 @@ def loose_sand_pages(
     if not run or not seeks_loose_sand(scenario):
         return None
     from sandmould.analysis.loose_zones import LOOSE
-    from sandmould.drawing.loose_field import LEAST, MOST, draw_loose_field  # scipy: few need it
+    from sandmould.drawing.loose_field import (  # scipy: few need it
+        LEAST,
+        MOST,
+        draw_loose_field,
+        on_surfaces,
+    )
     from sandmould.kinds.sand.loose import last_loose_sand
 
     loose = last_loose_sand(scenario, folder / "runs" / run)
@@ -69,6 +74,7 @@ def loose_sand_pages(
     return {
         "sentences": said,
         "picture": draw_loose_field(loose.field, numbers, last, scenario, height_m),
+        "surface": on_surfaces(loose.field),
         "ends": (LEAST, MOST),
         "loose": LOOSE,
         "table": _table([loose.zones[place - 1] for place in numbers], scenario),

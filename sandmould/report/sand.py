@@ -18,7 +18,7 @@ from sandmould.bad_input import BadInputError
 from sandmould.drawing import figures
 from sandmould.drawing.animation import BENT_M, Film, make_film
 from sandmould.drawing.sphere_film import SphereFilm, sphere_frames
-from sandmould.drawing.sphere_scene import sphere_scene
+from sandmould.drawing.sphere_scene import SurfaceField, sphere_scene
 from sandmould.engines.snapshot import Snapshot
 from sandmould.kinds.sand.moments import MOMENTS, Moment, list_moments, nearest
 from sandmould.report.curves import runs_of
@@ -118,7 +118,6 @@ def sand_pages(
         ),
         "layer_conclusion": _layer_conclusion(snapshots, scenario),
         "films": films,
-        "film_scene": _film_scene(scenario, height_m),
         "beside": beside,
         "tubes": measure_curves(
             collected, verdict, _tube_measures(collected.curves, scenario, verdict)
@@ -264,10 +263,15 @@ def _sphere_films(
     return tuple(films), beside
 
 
-def _film_scene(scenario: Scenario, height_m: float) -> dict[str, object]:
-    """The scene for the page's canvas, in m; a pattern is drawn as it bends, with the film."""
+def film_scene(
+    scenario: Scenario, height_m: float, fields: Sequence[SurfaceField]
+) -> dict[str, object]:
+    """The scene for the page's canvas, in m; a pattern is drawn as it bends, with the film.
+
+    In 3D its solids can be coloured by fields.
+    """
     if scenario.dimension == 3:
-        return sphere_scene(scenario, min(height_m, scenario.box.height_m))
+        return sphere_scene(scenario, min(height_m, scenario.box.height_m), fields)
     pattern = scenario.pattern.name if scenario.pattern is not None else ""
     obstacles = [o for o in scenario.obstacles if o.name != pattern]
     still = scenario.model_copy(update={"obstacles": tuple(obstacles), "pattern": None})

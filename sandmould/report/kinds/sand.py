@@ -16,7 +16,7 @@ from sandmould.report.loose_sand import loose_sand_pages
 from sandmould.report.method import measured_when, sand_method
 from sandmould.report.repose_figures import steepest_heaps
 from sandmould.report.robustness import robustness_pages
-from sandmould.report.sand import sand_pages
+from sandmould.report.sand import film_scene, sand_pages
 from sandmould.report.time_series import curve_figures
 from sandmould.runs.columns import LEAST_LIMIT_S, OVERLAP_P99_FRACTION, RUN, TIME_STEP_S, finished
 from sandmould.runs.formatting import number, setting_text
@@ -53,6 +53,8 @@ def _pages(findings: Findings[Scenario], film_budget_bytes: int) -> KindPages:
 
         bending = bending_pages(folder, href, scenario, of_sweep, verdict, run)
     loose = loose_sand_pages(folder, run, scenario, pages["height_m"])
+    surfaces = [loose["surface"]] if loose else []
+    pages["film_scene"] = film_scene(scenario, pages["height_m"], surfaces)
     return KindPages(
         "sand.html",
         sand_method(scenario, collected.keys, collected.summary),

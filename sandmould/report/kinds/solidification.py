@@ -15,13 +15,14 @@ import pandas as pd
 from matplotlib.figure import Figure
 
 from sandmould.analysis.freezing import freezing
-from sandmould.analysis.freezing_plots import draw_freezing, draw_temperature
-from sandmould.arrays import Floats
+from sandmould.analysis.freezing_plots import DistanceM, draw_freezing, draw_temperature
 from sandmould.casting.arpm.scene import solids_of
 from sandmould.definition.sweep import Point
 from sandmould.drawing.chart import Chart, Mark, tints
 from sandmould.drawing.figure_files import numbered, pictures
 from sandmould.drawing.figures import png
+from sandmould.drawing.sphere_film import bare_film
+from sandmould.drawing.sphere_scene import SurfaceField, solid_scene
 from sandmould.kinds.solidification.kind import SolidificationStudy
 from sandmould.report.kinds.kind import Findings, FirstPicture, KindPages, KindReport
 from sandmould.report.method import Row
@@ -30,6 +31,7 @@ from sandmould.report.time_series import curve_figures, measure_curves
 from sandmould.runs.columns import CPU_S, RUN, SOLIDIFICATION_TIME_S, TIME_S, finished
 from sandmould.runs.formatting import is_number, listed, name_of, number, seconds, setting_text
 from sandmould.runs.templates import notes, worded
+from sandmould.scenario.casting.shapes import Body
 from sandmould.scenario.casting.solidification import MouldMaterial, Solidification
 from sandmould.statistics.answer import Answer
 from sandmould.statistics.refining import resolution_among
@@ -77,6 +79,8 @@ def _pages(findings: Findings[Solidification], film_budget_bytes: int) -> KindPa
     stand_ins = _stand_ins(findings.answer.stand_ins)
     shown = {
         "pictured_run": run,
+        "scene": _scene(folder, scenario) if fields else None,
+        "films": (bare_film(run),),
         "fields": fields,
         "sentences": (*sentences, *stand_ins),
         "spots": spots,
@@ -159,11 +163,7 @@ def _fields(
     frozen = freezing(
         fields["position_m"][melts], fields["frozen_s"][melts], scenario.hot_spot_reach_m
     )
-    solids = solids_of(scenario)
-
-    def distance_m(places_m: Floats) -> Floats:
-        return np.min([solid.distance_m(places_m) for solid in solids], axis=0)
-
+    distance_m = distance_from(solids_of(scenario))
     figure = Figure(figsize=(11, 4.6), dpi=110, layout="constrained")
     left, right = figure.subplots(1, 2)
     draw_freezing(fields, frozen, left, distance_m)
@@ -183,6 +183,28 @@ def _fields(
         for place, time_s in zip(frozen.hot_spots_m, frozen.hot_spot_s, strict=True)
     )
     return png(figure), first, (said,), Table(columns, rows, (False,) * len(rows))
+
+
+def distance_from(solids: Sequence[Body]) -> DistanceM:
+    """How far places are from the nearest of some solids, negative inside."""
+    return lambda places_m: np.min([solid.distance_m(places_m) for solid in solids], axis=0)
+
+
+def _scene(folder: Path, scenario: Solidification) -> dict[str, object] | None:
+    """The casting for the 3D view, coloured by when it froze; None in two dimensions."""
+    if scenario.dimensions == 2:
+        return None
+    with np.load(folder / "fields.npz", allow_pickle=False) as file:
+        melts, size_m = file["melts"], float(file["size_m"].min())
+        place_m, frozen_s = file["position_m"][melts], file["frozen_s"][melts]
+    known = frozen_s[np.isfinite(frozen_s)]
+    if not len(known):
+        return None
+    low_s, high_s = float(known.min()), float(known.max())
+    ends = f"frozen after {number(low_s)} s", f"{number(high_s)} s"
+    field = SurfaceField("time of freezing", place_m, frozen_s, low_s, high_s, ends, size_m)
+    low_m, high_m = np.array(scenario.box.low_m), np.array(scenario.box.high_m)
+    return solid_scene(solids_of(scenario), low_m, high_m, [field])
 
 
 def _errors(point: Point, scenario: Solidification, collected: Collected) -> list[_Error]:

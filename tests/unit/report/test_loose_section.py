@@ -75,9 +75,8 @@ def test_a_hollow_under_a_plate_is_measured_and_told(folder: Path) -> None:
         "Sand lies loose at 100 % of the places straight under the obstacles, 0 % of the places"
     )
     assert pages["sentences"][0].startswith(sentence)
-    assert pages["sentences"][1] == (
-        "No place lies farther away, so that the share of chance is not known."
-    )
+    share = f"{100 * last['loose_away_fraction']:.1f} %"
+    assert pages["sentences"][1].startswith(f"By chance and in corners it is {share}: the share")
     (row,) = pages["table"].rows
     places = [f"{1e3 * written[f'{axis}_from_m']:.0f} to {1e3 * written[f'{axis}_to_m']:.0f}"
               for axis in "xyz"]  # fmt: skip
