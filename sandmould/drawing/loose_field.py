@@ -79,7 +79,7 @@ def draw_loose_field(
 
 def on_surfaces(field: LooseField) -> SurfaceField:
     """The same for the surfaces of the 3D view: what the sand next to them is like."""
-    grid = np.stack(np.indices(field.share.shape), axis=-1).reshape(-1, field.share.ndim)
+    grid = np.moveaxis(np.indices(field.share.shape), 0, -1).reshape(-1, field.share.ndim)
     return SurfaceField(
         "density of the sand at it, at the end",
         field.low_m + field.cell_m * grid,

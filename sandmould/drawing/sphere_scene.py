@@ -18,6 +18,7 @@ from sandmould.drawing.figures import cut_m
 from sandmould.geometry.geometry import Array, Block, Bore, Solid
 from sandmould.geometry.mesh import TriangleMesh
 from sandmould.geometry.revolved import Revolved
+from sandmould.scenario.casting.shapes import Body
 from sandmould.scenario.scenario import Scenario
 
 SIDES = 48
@@ -93,13 +94,14 @@ def sphere_scene(
 
 
 def solid_scene(
-    solids: Iterable[Solid], low_m: Array, high_m: Array, fields: Sequence[SurfaceField] = ()
+    solids: Iterable[Body], low_m: Array, high_m: Array, fields: Sequence[SurfaceField] = ()
 ) -> dict[str, object]:
     """Solids in a box without sand, for the same view.
 
     Parameters
     ----------
-    solids : iterable of Solid
+    solids : iterable of Body
+        Blocks and meshes.
     low_m, high_m : (3,) float64, m
         Corners of the box, which need not be at the origin.
     fields : sequence of SurfaceField, optional
@@ -108,6 +110,8 @@ def solid_scene(
     moved = [replace(field, place_m=field.place_m - low_m) for field in fields]
     packed = []
     for solid in solids:
+        if not isinstance(solid, Block | TriangleMesh):
+            continue
         vertices_m, triangles = _triangles(solid)
         shape = _packed(vertices_m - low_m, triangles, moved)
         packed.append({"name": solid.name, "opens": False, "bends": False, **shape})

@@ -131,7 +131,8 @@ def test_the_first_screen_shows_the_sand_of_the_best_setting(text: str) -> None:
 
 
 def test_the_table_of_runs_folds_in_a_frame_that_scrolls(text: str) -> None:
-    folded = text[text.index('<details id="runs-table">') : text.index("</details>")]
+    start = text.index('<details id="runs-table">')
+    folded = text[start : text.index("</details>", start)]
     assert "<summary>Table of 9 runs</summary>" in folded
     assert '<div class="scroll" tabindex="0" role="region" aria-label="Runs">' in folded
     assert folded.count("<tr") == 10
