@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 
 import numpy as np
 from matplotlib.axes import Axes
@@ -11,10 +11,20 @@ from numpy.typing import NDArray
 from sandmould.analysis.freezing import Freezing
 
 Array = NDArray[np.float64]
+DistanceM = Callable[[Array], Array]
+"""Signed distance of places (n, d) from the surface of what is cast, (n,) float64, m."""
 MOST_SPOTS = 12
+_INK, _CAST, _SAND = "#222222", "#B9BEC4", "#F1E5CC"
+_PLACES = 240
+"""Along each side of a picture, at which that distance is asked for to draw an outline."""
 
 
-def draw_freezing(fields: Mapping[str, Array], freezing: Freezing, axes: Axes) -> None:
+def draw_freezing(
+    fields: Mapping[str, Array],
+    freezing: Freezing,
+    axes: Axes,
+    distance_m: DistanceM | None = None,
+) -> None:
     """Draw freezing times over the casting with hot spots and the last point to freeze.
 
     Parameters
@@ -23,23 +33,27 @@ def draw_freezing(fields: Mapping[str, Array], freezing: Freezing, axes: Axes) -
         Arrays of ``fields.npz``.
     freezing : Freezing
     axes : Axes
+    distance_m : callable, optional
+        From the surface of what is cast, whose outline is then drawn.
     """
-    cut, axis = _cut(fields, freezing)
+    cut, axis, at_m = _cut(fields, freezing)
     melts = cut["melts"].astype(bool)
     values = np.where(melts, cut["frozen_s"], np.nan)
     _draw(cut, axis, values, axes, "frozen at, s", "viridis")
+    if distance_m is not None:
+        _draw_outline(cut, axis, at_m, axes, distance_m)
     beside_mm = 1e3 * (cut["position_m"][melts].min(axis=0) - 3.0 * cut["size_m"].max())
     beyond_mm = 1e3 * (cut["position_m"][melts].max(axis=0) + 3.0 * cut["size_m"].max())
     axes.set_xlim(beside_mm[0], beyond_mm[0])
     axes.set_ylim(beside_mm[1], beyond_mm[1])
     spots_mm = 1e3 * _flat(freezing.hot_spots_m[:MOST_SPOTS], axis)
-    axes.plot(*spots_mm.T, "o", mfc="none", mec="#D55E00", ms=9, mew=1.5, label="hot spot")
+    axes.plot(*spots_mm.T, "o", mfc="none", mec=_INK, ms=9, mew=1.5, label="hot spot")
     if np.isfinite(freezing.last_point_m).all():
         at = f"last to freeze, {freezing.solidification_time_s:.0f} s"
         axes.plot(
             *(1e3 * _flat(freezing.last_point_m[None], axis).T),
             "x",
-            color="#D55E00",
+            color=_INK,
             ms=9,
             mew=2,
             label=at,
@@ -47,20 +61,72 @@ def draw_freezing(fields: Mapping[str, Array], freezing: Freezing, axes: Axes) -
     axes.legend(fontsize=8, loc="upper right")
 
 
-def draw_temperature(fields: Mapping[str, Array], freezing: Freezing, axes: Axes) -> None:
+def draw_temperature(
+    fields: Mapping[str, Array],
+    freezing: Freezing,
+    axes: Axes,
+    distance_m: DistanceM | None = None,
+) -> None:
     """Draw temperatures at the end over casting and mould, as ``draw_freezing``."""
-    cut, axis = _cut(fields, freezing)
+    cut, axis, at_m = _cut(fields, freezing)
     _draw(cut, axis, cut["temperature_k"], axes, "temperature at the end, K", "inferno")
+    if distance_m is not None:
+        _draw_outline(cut, axis, at_m, axes, distance_m)
 
 
-def _cut(fields: Mapping[str, Array], freezing: Freezing) -> tuple[dict[str, Array], int]:
+def _draw_outline(
+    cut: Mapping[str, Array], axis: int, at_m: float, axes: Axes, distance_m: DistanceM
+) -> None:
+    """The part as it is drawn, over the elements that stand for it."""
+    ends_m = cut["position_m"].min(axis=0), cut["position_m"].max(axis=0)
+    along_mm, outside_m = _section(*ends_m, axis, at_m, distance_m)
+    axes.contour(*along_mm, outside_m, [0.0], colors=_INK, linewidths=1)
+
+
+def draw_part(low_m: Array, high_m: Array, at_m: float, axes: Axes, distance_m: DistanceM) -> None:
+    """Draw what is cast in its box before anything runs, in 3D where a plane cuts it.
+
+    Parameters
+    ----------
+    low_m, high_m : (d,) float64, m
+        Corners of the box.
+    at_m : float, m
+        In 3D, y of the plane of x and z.
+    axes : Axes
+    distance_m : callable
+        As in :func:`draw_freezing`.
+    """
+    axis = 1 if len(low_m) == 3 else 2
+    kept = [each for each in range(len(low_m)) if each != axis]
+    at_m = at_m if axis == 1 else np.nan
+    along_mm, outside_m = _section(low_m[kept], high_m[kept], axis, at_m, distance_m)
+    axes.contourf(*along_mm, outside_m, [-np.inf, 0.0], colors=[_CAST])
+    axes.contour(*along_mm, outside_m, [0.0], colors=_INK, linewidths=1)
+    axes.set_facecolor(_SAND)
+    axes.set_aspect("equal")
+    _name_axes(axes, axis)
+
+
+def _section(
+    low_m: Array, high_m: Array, axis: int, at_m: float, distance_m: DistanceM
+) -> tuple[list[Array], Array]:
+    """Places along both axes of a plane, mm, and the distance from what is cast, m."""
+    along = [np.linspace(*ends, _PLACES) for ends in zip(low_m, high_m, strict=True)]
+    places_m = np.stack(np.meshgrid(*along), axis=-1).reshape(-1, 2)
+    if np.isfinite(at_m):
+        places_m = np.insert(places_m, axis, at_m, axis=1)
+    return [1e3 * each for each in along], distance_m(places_m).reshape(_PLACES, _PLACES)
+
+
+def _cut(fields: Mapping[str, Array], freezing: Freezing) -> tuple[dict[str, Array], int, float]:
     """Elements of 3D that a plane through the last point to freeze cuts; all of 2D.
 
-    Of the three planes the one with most of the casting; given with its normal's number.
+    Of the three planes the one with most of the casting; given with its normal's number and where
+    it lies, in m.
     """
     position_m, half_m = fields["position_m"], 0.5 * fields["size_m"]
     if position_m.shape[1] == 2:
-        return dict(fields), 2
+        return dict(fields), 2, np.nan
     through_m = freezing.last_point_m
     if not np.isfinite(through_m).all():
         through_m = freezing.hot_spots_m[0]
@@ -71,7 +137,8 @@ def _cut(fields: Mapping[str, Array], freezing: Freezing) -> tuple[dict[str, Arr
     area = ((2.0 * half_m[melts, None]) ** 2 * within[melts]).sum(axis=0)
     axis = int(np.argmax(area))
     cut = {name: values[within[:, axis]] for name, values in fields.items()}
-    return cut | {"position_m": _flat(cut["position_m"], axis)}, axis
+    at_m = float(through_m[axis])
+    return cut | {"position_m": _flat(cut["position_m"], axis)}, axis, at_m
 
 
 def _flat(place_m: Array, axis: int) -> Array:
@@ -90,6 +157,10 @@ def _draw(
     )  # fmt: skip
     figure = axes.figure
     figure.colorbar(image, ax=axes, label=title, shrink=0.85)
+    _name_axes(axes, axis)
+
+
+def _name_axes(axes: Axes, axis: int) -> None:
     across, up = (name for place, name in enumerate("xyz") if place != axis)
     axes.set_xlabel(f"{across}, mm")
     axes.set_ylabel(f"{up}, mm")

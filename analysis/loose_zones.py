@@ -19,6 +19,7 @@ from scipy.spatial import cKDTree
 from sandmould.analysis.bed_density import buried_places
 from sandmould.analysis.free_space import free_part
 from sandmould.analysis.intersections import disc_lens_m2, sphere_lens_m3
+from sandmould.analysis.tube_fill import lies_in_bore
 from sandmould.geometry.geometry import Array, Scene, Solid, Wall, distance_within
 
 LOOSE = 0.9
@@ -40,14 +41,33 @@ SIDES: tuple[Side, ...] = ("under", "over", "beside", "away")
 class LooseZone:
     """Places that hang together at which sand lies loose."""
 
-    place_m: Array
-    """(d,) float64: mean of its places."""
+    low_m: Array
+    high_m: Array
+    """(d,) float64: ends of its places along each axis. A mean may lie inside a wall that the zone
+    goes round."""
     measure: float
     """Of its places, m2 in 2D or m3 in 3D."""
     solid_fraction: float
     """Mean over its places of the local one."""
     side: Side
     """Where most of its places lie."""
+    near: str
+    """The tube or cavity that holds most of them, else the solid nearest to most of them."""
+    is_inside: bool
+    """Whether it lies in that tube or cavity."""
+
+
+@dataclass(frozen=True)
+class LooseField:
+    """Local solid fraction over what is usual as far from a surface, on a grid."""
+
+    low_m: Array
+    """(d,) float64: its first place."""
+    cell_m: float
+    share: Array
+    """(nx, ..., nz) float64; NaN where no place is."""
+    zone: NDArray[np.int32]
+    """The same shape: 1 for a place of the first zone, and so on; 0 outside of all."""
 
 
 @dataclass(frozen=True)
@@ -60,6 +80,7 @@ class LooseSand:
     """The same of the places on each side of the solids; NaN where there are none."""
     zones: tuple[LooseZone, ...]
     """Those at least as large as a grain, the largest first."""
+    field: LooseField
 
 
 def find_loose_sand(position_m: Array, radius_m: Array, scene: Scene, grain_m: float) -> LooseSand:
@@ -84,20 +105,26 @@ def find_loose_sand(position_m: Array, radius_m: Array, scene: Scene, grain_m: f
     clear_m = np.minimum(from_solid_m, from_wall_m)
     is_place = is_buried & (clear_m > 0.0)
     if not is_place.any():
-        return LooseSand(np.nan, dict.fromkeys(SIDES, np.nan), ())
+        share, zone = np.full(is_place.shape, np.nan), np.zeros(is_place.shape, dtype=np.int32)
+        nothing = LooseField(np.zeros(grid.shape[-1]), cell_m, share, zone)
+        return LooseSand(np.nan, dict.fromkeys(SIDES, np.nan), (), nothing)
     points_m, clear_m = grid[is_place], clear_m[is_place]
     at_places = _local_fraction(points_m, position_m, radius_m, scene, ball_m, clear_m)
     usual = _usual_fraction(at_places, clear_m, ball_m, cell_m)
     local, loose = np.zeros(is_place.shape), np.zeros(is_place.shape, dtype=np.bool_)
     local[is_place], loose[is_place] = at_places, at_places < LOOSE * usual
+    share = np.full(is_place.shape, np.nan)
+    share[is_place] = at_places / usual
     side = _sides(from_solid_m, 2.0 * ball_m)
+    zones, zone = _zones(grid, loose, local, side, grain_m, scene)
     return LooseSand(
         float(loose[is_place].mean()),
         {
             name: float(loose[at].mean()) if (at := is_place & (side == number)).any() else np.nan
             for number, name in enumerate(SIDES)
         },
-        _zones(grid, loose, local, side, cell_m, grain_m),
+        zones,
+        LooseField(grid.reshape(-1, grid.shape[-1])[0], cell_m, share, zone),
     )
 
 
@@ -162,28 +189,43 @@ def _zones(
     loose: NDArray[np.bool_],
     local: Array,
     side: NDArray[np.int8],
-    cell_m: float,
     grain_m: float,
-) -> tuple[LooseZone, ...]:
-    """Zones at least as large as a grain, the largest first; ``local`` is 0 where no place is."""
-    dimension = grid.shape[-1]
-    number, count = label(loose)
-    if not count:
-        return ()
+    scene: Scene,
+) -> tuple[tuple[LooseZone, ...], NDArray[np.int32]]:
+    """Zones at least as large as a grain, the largest first, and each place's number of its zone.
+
+    ``local`` is 0 where no place is.
+    """
+    dimension, cell_m = grid.shape[-1], grain_m / CELLS_A_GRAIN
+    number, _ = label(loose)
     cell = cell_m**dimension
     grain = np.pi * grain_m**2 / 4.0 if dimension == 2 else np.pi * grain_m**3 / 6.0
     sizes = np.bincount(number.ravel())
     sizes[0] = 0
-    zones = []
+    zones, of_place = [], np.zeros(loose.shape, dtype=np.int32)
     for zone in np.argsort(sizes, kind="stable")[::-1].tolist():
         if sizes[zone] * cell < grain:
             break
         own = number == zone
+        points_m = grid[own]
         most = int(np.argmax(np.bincount(side[own], minlength=len(SIDES))))
-        zones.append(
-            LooseZone(
-                grid[own].mean(axis=0), float(sizes[zone] * cell), float(local[own].mean()),
-                SIDES[most],
-            )
-        )  # fmt: skip
-    return tuple(zones)
+        ends_m = points_m.min(axis=0), points_m.max(axis=0)
+        means = float(sizes[zone] * cell), float(local[own].mean())
+        zones.append(LooseZone(*ends_m, *means, SIDES[most], *_near(points_m, scene)))
+        of_place[own] = len(zones)
+    return tuple(zones), of_place
+
+
+def _near(points_m: Array, scene: Scene) -> tuple[str, bool]:
+    """The space that holds most of the points, else the solid nearest to most; and whether."""
+    for bore in scene.bores:
+        if lies_in_bore(points_m, bore).mean() > 0.5:
+            return bore.name, True
+    for cavity in scene.cavities:
+        if (cavity.space.distance_m(points_m) < 0.0).mean() > 0.5:
+            return cavity.name, True
+    if not scene.solids:
+        return "", False
+    apart_m = np.stack([solid.distance_m(points_m) for solid in scene.solids])
+    nearest = np.bincount(np.argmin(apart_m, axis=0), minlength=len(scene.solids))
+    return scene.solids[int(np.argmax(nearest))].name, False

@@ -317,12 +317,13 @@ def show(
         ),
     ] = None,
 ) -> None:  # fmt: skip
-    """Draw a scene of sand to scale before anything runs."""
+    """Draw a scene of sand, or a casting, to scale before anything runs."""
     from sandmould.report.scene_page import draw_scene_file
     from sandmould.study.plan.drawn_run import drawn_run
 
     opened, shown = drawn_run(study, run)
-    ending = "png" if shown.scenario.dimension == 2 else "html"
+    flat = "dimension" if opened.study.kind == "sand" else "dimensions"
+    ending = "png" if getattr(shown.scenario, flat) == 2 else "html"
     out = output or Path(f"{opened.name}_scene.{ending}")
     draw_scene_file(shown.scenario, opened.study.title or opened.name, shown.run, out)
     typer.echo(out)
@@ -352,13 +353,19 @@ def export(
 
 
 @app.command(epilog="Example: sandmould report my_study.yaml")
-def report(study: StudyFile) -> None:
+def report(
+    study: StudyFile,
+    xlsx: Annotated[
+        bool,
+        typer.Option("--xlsx", help="Write report.xlsx too: settings and runs in mm, Hz, g, °C."),
+    ] = False,
+) -> None:
     """Write the report of a study again from its results."""
     from sandmould.execution.screen.ending import last_line
     from sandmould.report.page import write_report
     from sandmould.study.plan.build_plan import RESULTS
     from sandmould.study.plan.ownership import check_owner
-    from sandmould.study.plan.plan_files import SUMMARY
+    from sandmould.study.plan.plan_files import SPREADSHEET, SUMMARY
 
     folder = RESULTS / study.stem
     check_owner(study, folder)
@@ -370,6 +377,10 @@ def report(study: StudyFile) -> None:
         raise BadInputError([Problem("results", str(folder), valid)])
     page = folder / "report.html"
     try:
+        if xlsx:
+            from sandmould.report.spreadsheet import write_spreadsheet
+
+            write_spreadsheet(folder, folder / SPREADSHEET)
         write_report(folder, page)
     except (ValueError, FileNotFoundError) as error:
         valid = f"a folder of results that can be read ({error})"

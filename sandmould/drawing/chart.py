@@ -24,6 +24,8 @@ _CHARACTER = 7.4
 _BOLD = 8.3
 """Widths of a character of 13 px, generously."""
 _LINE = 15.0
+_BESIDE = 9.0
+"""From the end of a curve or axis to a label."""
 
 
 @dataclass(frozen=True)
@@ -168,6 +170,8 @@ class LaidLine:
     line: Line
     path: str
     end: tuple[float, float]
+    label_x: float
+    """Beyond the axis for a mean, which other curves then do not cross; else beside its end."""
     label_y: float
 
 
@@ -355,7 +359,13 @@ def _laid_lines(lines: Sequence[Line], x: Axis, y: Axis) -> tuple[LaidLine, ...]
     labelled = [(i, end[1]) for i, (line, _, end) in enumerate(laid) if line.label]
     heights = dict(_spread(labelled, y.end, y.start))
     return tuple(
-        LaidLine(line, path, end, heights.get(i, end[1]))
+        LaidLine(
+            line,
+            path,
+            end,
+            (x.end if line.style == "mean" else end[0]) + _BESIDE,
+            heights.get(i, end[1]),
+        )
         for i, (line, path, end) in enumerate(laid)
     )
 

@@ -89,6 +89,16 @@ class SphereFilm(PackedFilm):
         return f"sphereFilmArrived({json.dumps(self.values, separators=(',', ':'))});\n"
 
 
+def bare_film(run: str) -> SphereFilm:
+    """A film of no grain, for a view of solids alone."""
+    return SphereFilm(
+        run=run, label="", grains=0, of_grains=0, vertices=0, time_s=(0.0,),
+        vibration_time_s=(None,), stage=("",), is_filling=(False,), reading=(None,),
+        origin_m=(0.0, 0.0, 0.0), quantum_m=1.0, largest_radius_m=1.0, slice_m=None,
+        density_kg_m3=(0.0, 1.0), fastest_m_s=1.0, data=encoded(b""),
+    )  # fmt: skip
+
+
 @dataclass(frozen=True)
 class SphereFrames:
     """Frames of a run, quantised and shaded, before they are packed."""

@@ -265,6 +265,7 @@ def _render(
         half_sizes=lambda chart: (lay_out(chart, SMALL), lay_out(chart, NARROW)),
         advice=[] if optimum else _beside_mode(page, mode),
         warning=of_kind.warning,
+        picture=of_kind.picture,
         reported_best=page.study.objective.reported_best,
         **of_kind.context,
     )

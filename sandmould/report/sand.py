@@ -18,9 +18,10 @@ from sandmould.bad_input import BadInputError
 from sandmould.drawing import figures
 from sandmould.drawing.animation import BENT_M, Film, make_film
 from sandmould.drawing.sphere_film import SphereFilm, sphere_frames
-from sandmould.drawing.sphere_scene import sphere_scene
+from sandmould.drawing.sphere_scene import SurfaceField, sphere_scene
 from sandmould.engines.snapshot import Snapshot
 from sandmould.kinds.sand.moments import MOMENTS, Moment, list_moments, nearest
+from sandmould.report.curves import runs_of
 from sandmould.report.time_series import measure_curves
 from sandmould.runs.columns import (
     BED_HEIGHT_M,
@@ -77,9 +78,13 @@ def sand_pages(
     moments = list_moments(study_folder / "runs" / run) if run else ()
     chosen = _chosen(moments, scenario)
     snapshots = [m.load() for _, m in chosen]
+    headings = [f"{heading}, {_clock_s(moment):.2f} s" for heading, moment in chosen]
     height_m = _picture_height_m(snapshots, scenario)
     layers = figures.draw_layers(snapshots, scenario, height_m)
-    densities, scale, median_kg_m3 = figures.draw_densities(snapshots, scenario, height_m)
+    ends = sorted({0, len(chosen) - 1}) if chosen else []
+    densities, scale, median_kg_m3 = figures.draw_densities(
+        [snapshots[end] for end in ends], scenario, height_m
+    )
     shown = _shown_runs(study_folder, roles, collected, verdict, scenario)
     films: tuple[Film, ...] | tuple[SphereFilm, ...]
     beside: dict[str, str] = {}
@@ -94,18 +99,18 @@ def sand_pages(
         "scene": figures.draw_dimensions(scenario, bed_m),
         "scene_alt": _scene_alt(scenario, bed_m),
         "pictured_run": run,
+        "height_m": height_m,
         "role": _role_text(next(iter(roles), ""), verdict, collected.summary),
         "panels": tuple(
             {
-                "heading": f"{heading}, {_clock_s(moment):.2f} s",
-                "by_layer": by_layer,
+                "heading": headings[end],
+                "by_layer": layers[end],
                 "by_density": by_density,
-                "alt": f"The sand of run {run} {heading}",
+                "alt": f"The sand of run {run} {chosen[end][0]}",
             }
-            for (heading, moment), by_layer, by_density in zip(
-                chosen, layers, densities, strict=True
-            )
+            for end, by_density in zip(ends, densities, strict=True)
         ),
+        "moments": tuple(zip(headings, layers, strict=True)),
         "density_scale": scale,
         "density_conclusion": _density_conclusion(median_kg_m3),
         "layer_colours": tuple(
@@ -113,7 +118,6 @@ def sand_pages(
         ),
         "layer_conclusion": _layer_conclusion(snapshots, scenario),
         "films": films,
-        "film_scene": _film_scene(scenario, height_m),
         "beside": beside,
         "tubes": measure_curves(
             collected, verdict, _tube_measures(collected.curves, scenario, verdict)
@@ -130,12 +134,17 @@ def _clock_s(moment: Moment) -> float:
 
 
 def pictured_runs(study_folder: Path, summary: pd.DataFrame, verdict: Verdict) -> dict[str, str]:
-    """Runs to be looked at, by role: best, median and worst, or what there is.
+    """Runs to be looked at, by role: of the best setting, median and worst, or what there is.
 
-    Where one run can be used it is the only one. Where none can, that with most snapshots stands
-    alone: to see how it failed.
+    Of the best setting it is the run in the middle, not the luckiest. Where one run can be used it
+    is the only one. Where none can, that with most snapshots stands alone: to see how it failed.
     """
     ranks = rank_runs(summary, verdict.measure, verdict.better)
+    if "best" in ranks and verdict.best is not None:
+        own = rank_runs(runs_of(summary, verdict.best), verdict.measure, verdict.better)
+        best = own.get("median", own["best"])
+        others = {role: run for role, run in ranks.items() if role != "best" and run != best}
+        ranks = {"best": best, **others}
     with_snapshots = {
         r: run for r, run in ranks.items() if list_moments(study_folder / "runs" / run)
     }
@@ -154,6 +163,8 @@ def _role_text(role: str, verdict: Verdict, summary: pd.DataFrame) -> str:
         none = "none gives a value that can be used" if finished(summary).any() else "none finished"
         return f"which got farthest: {none}"
     most = _value_words(verdict).get(role, role)
+    if role == "best" and verdict.best is not None and verdict.best.n > 1:
+        return f"in the middle of those with the {most} mean {name_of(verdict.measure)}"
     if role == "median":
         return f"the one in the middle by the {name_of(verdict.measure)} of single runs"
     return f"the one with the {most} {name_of(verdict.measure)} of all single runs"
@@ -218,7 +229,7 @@ def _shown_runs(
 ) -> list[_Shown]:
     """Runs that films are made of: those of the scene's dimension."""
     shown = []
-    words = _value_words(verdict)
+    words = _value_words(verdict) | {"best": "best setting"}
     for role, run in roles.items():
         row = collected.summary[collected.summary[RUN] == run].iloc[0]
         setting = setting_text({key: row[key] for key in collected.keys})
@@ -252,10 +263,15 @@ def _sphere_films(
     return tuple(films), beside
 
 
-def _film_scene(scenario: Scenario, height_m: float) -> dict[str, object]:
-    """The scene for the page's canvas, in m; a pattern is drawn as it bends, with the film."""
+def film_scene(
+    scenario: Scenario, height_m: float, fields: Sequence[SurfaceField]
+) -> dict[str, object]:
+    """The scene for the page's canvas, in m; a pattern is drawn as it bends, with the film.
+
+    In 3D its solids can be coloured by fields.
+    """
     if scenario.dimension == 3:
-        return sphere_scene(scenario, min(height_m, scenario.box.height_m))
+        return sphere_scene(scenario, min(height_m, scenario.box.height_m), fields)
     pattern = scenario.pattern.name if scenario.pattern is not None else ""
     obstacles = [o for o in scenario.obstacles if o.name != pattern]
     still = scenario.model_copy(update={"obstacles": tuple(obstacles), "pattern": None})

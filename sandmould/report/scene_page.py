@@ -1,15 +1,18 @@
-"""A scene of sand to scale before anything runs: as a picture, or as a page with a 3D view."""
+"""A scene to scale before anything runs: as a picture, or as a page with a 3D view."""
 
 from __future__ import annotations
 
 import math
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 from matplotlib.figure import Figure
 
+from sandmould.analysis.freezing_plots import draw_part
 from sandmould.analysis.plots import LAYER_COLOURS
 from sandmould.bad_input import BadInputError, Problem
+from sandmould.casting.arpm.scene import solids_of
 from sandmould.drawing.figures import (
     DensityScale,
     cut_m,
@@ -18,14 +21,16 @@ from sandmould.drawing.figures import (
     png_bytes,
     svg_bytes,
 )
-from sandmould.drawing.sphere_film import SphereFilm, sphere_frames
-from sandmould.drawing.sphere_scene import sphere_scene
+from sandmould.drawing.sphere_film import SphereFilm, bare_film, sphere_frames
+from sandmould.drawing.sphere_scene import solid_scene, sphere_scene
 from sandmould.drawing.templates import page_environment
 from sandmould.engines.snapshot import Snapshot
 from sandmould.geometry.geometry import Bore, Cavity
+from sandmould.report.kinds.solidification import distance_from
 from sandmould.report.method import Row
 from sandmould.runs.files import replaced
 from sandmould.runs.formatting import listed, number
+from sandmould.scenario.casting.solidification import Solidification
 from sandmould.scenario.likely_bed import LikelyBed, likely_bed
 from sandmould.scenario.placement import plan_counts
 from sandmould.scenario.scenario import Scenario
@@ -35,12 +40,12 @@ ENDINGS = (".html", ".png", ".svg")
 _DPI = 160
 
 
-def draw_scene_file(scenario: Scenario, title: str, run: str, out: Path) -> None:
-    """Draw box, solids, cavities, likely grains and vibration to scale.
+def draw_scene_file(scenario: Scenario | Solidification, title: str, run: str, out: Path) -> None:
+    """Draw box, solids, cavities, likely grains and vibration to scale, or a casting in its box.
 
     Parameters
     ----------
-    scenario : Scenario
+    scenario : Scenario or Solidification
     title, run : str
         What the page is headed with.
     out : Path
@@ -60,17 +65,19 @@ def draw_scene_file(scenario: Scenario, title: str, run: str, out: Path) -> None
         raise BadInputError([Problem("--output", str(out), "a file in a folder that is there")])
     # opened before a minute of drawing, and not after it
     with replaced(out) as partial, partial.open("wb") as file:
-        bed = likely_bed(scenario, cut_m(scenario))
-        grains = _as_snapshot(bed)
-        figure = dimensioned(scenario, None, grains)
-        _key(figure, bed)
+        if isinstance(scenario, Solidification):
+            figure, shown = _of_casting(scenario, run)
+        else:
+            figure, shown = _of_sand(scenario, run)
         figure.set_dpi(_DPI)
         if out.suffix.lower() == ".svg":
             file.write(svg_bytes(figure))
         elif out.suffix.lower() == ".png":
             file.write(png_bytes(figure))
         else:
-            file.write(_page(scenario, title, run, figure, bed, grains).encode())
+            picture = picture_address(png_bytes(figure))
+            page = page_environment().get_template("scene.html")
+            file.write(page.render(title=title, run=run, picture=picture, **shown).encode())
 
 
 def _as_snapshot(bed: LikelyBed) -> Snapshot:
@@ -101,9 +108,12 @@ def _key(figure: Figure, bed: LikelyBed) -> None:
     key.set_bbox_to_anchor((1.0, 1.0))
 
 
-def _page(
-    scenario: Scenario, title: str, run: str, figure: Figure, bed: LikelyBed, grains: Snapshot
-) -> str:
+def _of_sand(scenario: Scenario, run: str) -> tuple[Figure, dict[str, Any]]:
+    """Picture of a scene of sand, and what its page shows."""
+    bed = likely_bed(scenario, cut_m(scenario))
+    grains = _as_snapshot(bed)
+    figure = dimensioned(scenario, None, grains)
+    _key(figure, bed)
     films: tuple[SphereFilm, ...] = ()
     scene: dict[str, object] = {}
     if scenario.dimension == 3:
@@ -112,24 +122,43 @@ def _page(
         scene = sphere_scene(scenario, scenario.box.height_m)
         scene["marks"] = _arrow(scenario)
         # stronger than where the sand has moved: what is looked at here is the part
-        scene["solid_tint"] = [0.2, 0.2, 0.24, 0.85]
+        scene["solid_tint"] = [0.42, 0.46, 0.52, 0.85]
     layers = range(1, int(bed.layer.max(initial=1)) + 1)
-    return (
-        page_environment()
-        .get_template("scene.html")
-        .render(
-            title=title,
-            run=run,
-            dimension=scenario.dimension,
-            picture=picture_address(png_bytes(figure)),
-            facts=_facts(scenario),
-            slice_note=_slice_note(bed, scenario.dimension),
-            vibrates=bool(scenario.vibrations),
-            films=films,
-            scene=scene,
-            layer_colours=[(n, LAYER_COLOURS[(n - 1) % len(LAYER_COLOURS)]) for n in layers],
-        )
-    )
+    return figure, {
+        "is_cast": False,
+        "dimension": scenario.dimension,
+        "facts": _facts(scenario),
+        "slice_note": _slice_note(bed, scenario.dimension),
+        "vibrates": bool(scenario.vibrations),
+        "films": films,
+        "scene": scene,
+        "layer_colours": [(n, LAYER_COLOURS[(n - 1) % len(LAYER_COLOURS)]) for n in layers],
+    }
+
+
+def _of_casting(scenario: Solidification, run: str) -> tuple[Figure, dict[str, Any]]:
+    """The same of a casting in its box; of many parts the plane goes through the first."""
+    low_m, high_m = np.array(scenario.box.low_m), np.array(scenario.box.high_m)
+    solids = solids_of(scenario)
+    y = solids[0].corners()[:, 1]
+    figure = Figure(figsize=(6.0, 5.0), layout="constrained")
+    middle_m = 0.5 * float(y.min() + y.max())
+    draw_part(low_m, high_m, middle_m, figure.subplots(), distance_from(solids))
+    sides = " × ".join(f"{1e3 * side:g}" for side in high_m - low_m)
+    return figure, {
+        "is_cast": True,
+        "dimension": scenario.dimensions,
+        "facts": (
+            Row("box", f"{sides} mm"),
+            Row("cast", listed([solid.name for solid in solids], most=8)),
+            Row("elements", f"{1e3 * scenario.element_m:g} mm"),
+        ),
+        "slice_note": "",
+        "vibrates": False,
+        "films": (bare_film(run),),
+        "scene": solid_scene(solids, low_m, high_m) if scenario.dimensions == 3 else {},
+        "layer_colours": [],
+    }
 
 
 def _slice_note(bed: LikelyBed, dimension: int) -> str:

@@ -49,7 +49,14 @@ from sandmould.scenario.drive import BoxDrive
 from sandmould.statistics.agreement import sweep_part
 from sandmould.statistics.evidence import NOT_FINISHED, left_out
 from sandmould.statistics.verdict import Verdict
-from sandmould.study.plan.plan_files import CHECKS, CURVES, FIGURES, STUDY_FILE, SUMMARY
+from sandmould.study.plan.plan_files import (
+    CHECKS,
+    CURVES,
+    FIGURES,
+    SPREADSHEET,
+    STUDY_FILE,
+    SUMMARY,
+)
 from sandmould.wording.answer import why_unused
 
 
@@ -344,6 +351,7 @@ _FILES = (
     ("runs.tsv", "the plan: every run, its parameters, replicate and seed"),
     (SUMMARY, "one row per run of the sweep: parameters, outcome, final measures, cost"),
     (CURVES, "one row per snapshot of the sweep: all measures against time"),
+    (SPREADSHEET, "settings and runs in mm, Hz, g and °C"),
     (CHECKS[0], "the runs that check the sweep, on another engine or as controls: one row per run"),
     (CHECKS[1], "the same runs: one row per snapshot"),
     (FIGURES, "main figures as files: charts as SVG, sand as PNG"),

@@ -215,11 +215,11 @@ def setting_text(values: Mapping[str, Any]) -> str:
         ((key, value),) = values.items()
         text = value_text(key, value)
         return text if unit_of(key) else f"{name_of(key)} {text}"
-    names = _distinct_names(list(values))
+    names = distinct_names(list(values))
     return ", ".join(f"{names[k]} {value_text(k, v)}" for k, v in values.items())
 
 
-def _distinct_names(keys: Sequence[str]) -> dict[str, str]:
+def distinct_names(keys: Sequence[str]) -> dict[str, str]:
     """Names of keys; those with one name get their section's before it."""
     names = {key: name_of(key) for key in keys}
     several = {name for name in names.values() if list(names.values()).count(name) > 1}

@@ -4,7 +4,7 @@
   const canvas = byId("film-canvas"), slider = byId("film-slider"), play = byId("film-play");
   const time = byId("film-time"), choice = byId("film-run"), colour = byId("film-colour");
   const cutAxis = byId("film-cut"), cutPlace = byId("film-cut-place"), sand = byId("film-sand");
-  const solids = byId("film-solids"), all = byId("film-all");
+  const solids = byId("film-solids"), all = byId("film-all"), surface = byId("film-surface");
   const stored = [...document.querySelectorAll("script.film")];
   const measure = JSON.parse(byId("film-measure").textContent);
   const FRAMES_PER_S = 10, STEP = 0.12;
@@ -17,6 +17,8 @@
       solid.places = new Float32Array(buffer, 0, v);
       solid.faces = new Uint32Array(buffer, 4 * v, t);
       solid.lines = new Uint32Array(buffer, 4 * (v + t), e);
+      const shades = (n) => new Uint8Array(buffer, 4 * (v + t + e) + n * solid.vertices, solid.vertices);
+      solid.shades = Array.from({ length: solid.fields }, (_, n) => shades(n));
     }
     return scene;
   }
@@ -66,7 +68,8 @@
     }
 
     function tellCut() {
-      const text = cutPlace.disabled ? "nothing cut away" : `${cutAxis.value} = ${Number(cutPlace.value).toFixed(1)} mm`;
+      const from = 1000 * (scene.from_m["xyz".indexOf(cutAxis.value)] || 0), at = from + Number(cutPlace.value);
+      const text = cutPlace.disabled ? "nothing cut away" : `${cutAxis.value} = ${at.toFixed(1)} mm`;
       byId("film-cut-text").textContent = text;
       cutPlace.setAttribute("aria-valuetext", text);
     }
@@ -88,7 +91,8 @@
 
     function tellFilm() {
       const whole = !film.slice_m, n = (count) => count.toLocaleString("en").replaceAll(",", "\u00a0");
-      byId("film-shown").textContent = whole
+      if (scene.is_bare) for (const it of [colour, sand]) it.parentElement.hidden = true;
+      byId("film-shown").textContent = scene.is_bare ? "" : whole
         ? `All ${n(film.grains)} grains at ${film.frames} moment${film.frames === 1 ? "" : "s"}.`
         : `${n(film.grains)} of ${n(film.of_grains)} grains at ${film.frames} moments: a slice from y = ` +
           `${film.slice_m.map((y) => (1000 * y).toFixed(0)).join(" to ")} mm, each grain to scale.`;
@@ -105,12 +109,15 @@
         tellFilm();
       }
       const { shades, rgb, ends } = COLOURS[colour.value];
-      byId("film-layers").hidden = Boolean(ends);
+      const painted = scene.fields[surface.value];
+      byId("film-layers").hidden = Boolean(ends) || Boolean(scene.is_bare);
+      byId("film-surface-scale").hidden = !painted;
+      if (painted) [byId("film-surface-low").textContent, byId("film-surface-high").textContent] = painted.ends;
       byId("film-scale").hidden = !ends;
       if (ends) [byId("film-low").textContent, byId("film-high").textContent] = ends();
       view.draw({
         frame, shade: shades(frame), rgb: rgb || scene.shades, camera: { ...camera, pxPerM: pxPerM() }, cut: cut(),
-        showsSand: sand.checked, showsSolids: solids.checked,
+        showsSand: sand.checked, showsSolids: solids.checked, painted: painted ? Number(surface.value) : -1,
       });
       tellLook();
       tellTime(film, frame, measure, { time, slider });
@@ -198,7 +205,7 @@
     byId("film-farther").addEventListener("click", () => zoom(0.8));
     cutAxis.addEventListener("change", () => { setCutAxis(); redraw(); });
     cutPlace.addEventListener("input", () => { tellCut(); redraw(); });
-    for (const control of [colour, sand, solids]) control.addEventListener("change", redraw);
+    for (const control of [colour, sand, solids, surface]) control.addEventListener("change", redraw);
 
     const asked = new Map();
     window.sphereFilmArrived = (packed) => player.replace(asked.get(packed.run), packed);

@@ -61,14 +61,18 @@ function sphereView(canvas, scene) {
     }`];
   const SOLID = [`${VIEW}
     in vec3 place;
+    in vec4 paint;
     uniform float nearer;
     out vec3 p;
+    out vec4 painted;
     void main() {
       p = place;
+      painted = paint;
       gl_Position = seen(place);
       gl_Position.z -= nearer;
     }`, `${VIEW}
     in vec3 p;
+    in vec4 painted;
     uniform vec4 tint;
     uniform bool shaded, whole;
     out vec4 pixel;
@@ -76,7 +80,7 @@ function sphereView(canvas, scene) {
       if (!whole && dot(cut.xyz, p) > cut.w) discard;
       vec3 normal = normalize(cross(dFdx(p), dFdy(p)));
       float bright = shaded ? 0.55 + 0.45 * abs(dot(normal, normalize(toward + 0.5 * up - 0.35 * right))) : 1.0;
-      pixel = vec4(tint.rgb * bright, tint.a);
+      pixel = vec4(mix(tint.rgb, painted.rgb, painted.a) * bright, tint.a);
     }`];
 
   function program([vertex, fragment]) {
@@ -116,18 +120,27 @@ function sphereView(canvas, scene) {
   }
 
   const spheres = program(SPHERE), solids = program(SOLID);
+  gl.vertexAttrib4f(solids.attribute("paint"), 0, 0, 0, 0); // of pieces without colours of their own
   const colours = gl.createTexture();
   let grains = null, shown = {};
 
-  function surface(vertices, triangles, edges) {
-    const of = (indices) => {
+  // shades: one array a field
+  function surface(vertices, triangles, edges, shades = []) {
+    const of = (indices, colours) => {
       const array = gl.createVertexArray();
       gl.bindVertexArray(array);
       const places = attribute(solids, "place", vertices, 3, gl.FLOAT, false, 0);
+      if (colours) attribute(solids, "paint", colours, 4, gl.UNSIGNED_BYTE, true, 0);
       buffer(indices, gl.ELEMENT_ARRAY_BUFFER);
       return { array, places, count: indices.length };
     };
-    return { faces: of(triangles), lines: of(edges) };
+    return { faces: of(triangles), lines: of(edges), painted: shades.map((each) => of(triangles, inColours(each))) };
+  }
+
+  // red, green, blue and 255 of each shade; four times 0 where it is not known
+  function inColours(shades) {
+    const bytes = scene.shades.map((hex) => [...[1, 3, 5].map((at) => parseInt(hex.slice(at, at + 2), 16)), 255]);
+    return Uint8Array.from({ length: 4 * shades.length }, (_, n) => (bytes[shades[n >> 2]] || [0, 0, 0, 0])[n & 3]);
   }
 
   // the box is open at the top; corners are numbered by x, y and z as binary digits
@@ -138,7 +151,7 @@ function sphereView(canvas, scene) {
     Uint32Array.from([0, 1, 2, 3, 4, 5, 6, 7, 0, 2, 1, 3, 4, 6, 5, 7, 0, 4, 1, 5, 2, 6, 3, 7]));
   const lines = (points) => surface(Float32Array.from(points), new Uint32Array(0), Uint32Array.from(points.slice(points.length * 2 / 3).map((_, n) => n)));
   const bores = scene.bores.map(lines), marks = (scene.marks || []).map(lines);
-  const parts = scene.solids.map((solid) => ({ ...solid, ...surface(solid.places, solid.faces, solid.lines) }));
+  const parts = scene.solids.map((solid) => ({ ...solid, ...surface(solid.places, solid.faces, solid.lines, solid.shades) }));
 
   // radii and layers of a film, once; places and shades of a frame are set as it is shown
   function take(film) {
@@ -221,7 +234,7 @@ function sphereView(canvas, scene) {
     gl.disable(gl.CULL_FACE);
   }
 
-  function draw({ frame, shade, rgb, camera, cut, showsSand, showsSolids }) {
+  function draw({ frame, shade, rgb, camera, cut, showsSand, showsSolids, painted }) {
     const ratio = Math.min(window.devicePixelRatio || 1, 2);
     canvas.width = Math.round(canvas.clientWidth * ratio);
     canvas.height = Math.round(canvas.clientHeight * ratio);
@@ -245,6 +258,10 @@ function sphereView(canvas, scene) {
     }
     look(solids, camera, cut);
     const standing = parts.filter((part) => showsSolids && !(part.opens && !film.is_filling[frame]));
+    // opaque, so that what is in front hides what is behind
+    for (const part of standing.filter((p) => p.painted[painted])) {
+      paint(part.painted[painted], gl.TRIANGLES, [0.6, 0.62, 0.65, 1], { shaded: true });
+    }
     paint(box.lines, gl.LINES, [0.35, 0.37, 0.39, 1], { whole: true });
     for (const part of standing) paint(part.lines, gl.LINES, [0.2, 0.22, 0.25, 1], { nearer: 1e-4 });
     if (showsSolids) for (const bore of bores) paint(bore.lines, gl.LINES, [0.04, 0.36, 0.68, 1], { nearer: 1e-4 });
@@ -253,7 +270,7 @@ function sphereView(canvas, scene) {
     gl.blendFunc(gl.SRC_ALPHA, gl.ONE_MINUS_SRC_ALPHA);
     gl.depthMask(false);
     paintThrough(box.faces, [0.75, 0.78, 0.8, 0.25], [gl.FRONT]);
-    for (const part of standing) paintThrough(part.faces, scene.solid_tint, [gl.FRONT, gl.BACK]);
+    for (const part of standing.filter((p) => !p.painted[painted])) paintThrough(part.faces, scene.solid_tint, [gl.FRONT, gl.BACK]);
     gl.bindVertexArray(null);
   }
 

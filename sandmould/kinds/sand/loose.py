@@ -13,7 +13,10 @@ from sandmould.kinds.sand.moments import list_moments
 from sandmould.scenario.scenario import Scenario
 
 LOOSE_ZONES = "loose_zones.tsv"
-_COLUMNS = ("x_m", "y_m", "z_m", "volume_m3", "solid_fraction", "side")
+_COLUMNS = (
+    "x_from_m", "y_from_m", "z_from_m", "x_to_m", "y_to_m", "z_to_m", "volume_m3",
+    "solid_fraction", "side", "near",
+)  # fmt: skip
 
 
 def last_loose_sand(scenario: Scenario, folder: Path) -> LooseSand | None:
@@ -47,6 +50,6 @@ def add_loose_sand(table: pd.DataFrame, loose: LooseSand | None) -> pd.DataFrame
 
 def write_loose_zones(loose: LooseSand, out: Path) -> None:
     """Write a row a zone, the largest first."""
-    rows = [(*z.place_m, z.measure, z.solid_fraction, z.side) for z in loose.zones]
+    rows = [(*z.low_m, *z.high_m, z.measure, z.solid_fraction, z.side, z.near) for z in loose.zones]
     table = pd.DataFrame(rows, columns=list(_COLUMNS))
     table.to_csv(out, sep="\t", index=False, float_format="%.6g")

@@ -33,7 +33,7 @@ from sandmould.report.flow_charts import (
     said_of,
     stability_map,
 )
-from sandmould.report.kinds.kind import Findings, KindPages, KindReport
+from sandmould.report.kinds.kind import Findings, FirstPicture, KindPages, KindReport
 from sandmould.report.method import Row
 from sandmould.report.tables import Cell, Column, Table
 from sandmould.report.time_series import measure_curves
@@ -116,6 +116,7 @@ def _pages(findings: Findings[MetalFlow], film_budget_bytes: int) -> KindPages:
             **pictures(stability_map=stable, fields=fields),
             **numbered("histories", (history.chart for history in histories)),
         },
+        picture=_first_picture(pictured[:1], highest_pa),
         answer=next(iter(hopping), "") or _calm(scenario, ranked, keys),
         grounds=notes(
             "flow_grounds.j2",
@@ -125,6 +126,15 @@ def _pages(findings: Findings[MetalFlow], film_budget_bytes: int) -> KindPages:
         ),
         steps=_steps(scenario, ranked),
     )
+
+
+def _first_picture(calmest: Sequence[_PicturedRun], highest_pa: float) -> FirstPicture | None:
+    """The metal at the end of the calmest run; None where no run has left fields."""
+    for run in calmest:
+        alt = f"Particles of run {run.run} at its end, coloured by pressure"
+        caption = f"{run.label}, at its end, coloured by pressure."
+        return FirstPicture(_fields([run], highest_pa), alt, caption)
+    return None
 
 
 def _ranked(scenario: MetalFlow, summary: pd.DataFrame) -> pd.DataFrame:

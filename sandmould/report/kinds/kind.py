@@ -25,6 +25,16 @@ from sandmould.wording.next_steps import NextStep
 
 
 @dataclass(frozen=True)
+class FirstPicture:
+    """What the first screen shows of the setting that it names."""
+
+    address: str
+    """A ``data:`` address."""
+    alt: str
+    caption: str
+
+
+@dataclass(frozen=True)
 class KindPages:
     """The part of a report that depends on what is simulated."""
 
@@ -37,6 +47,7 @@ class KindPages:
     """What the template is given beside what all are given."""
     figures: Mapping[str, Chart | bytes] = field(default_factory=dict)
     """What is written as files too, by name."""
+    picture: FirstPicture | None = None
     beside: Mapping[str, str] = field(default_factory=dict)
     """Scripts for the folder ``SPHERES`` beside the page, by file name."""
     answer: str = ""

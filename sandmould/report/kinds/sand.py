@@ -11,18 +11,19 @@ from sandmould.drawing.figure_files import pictures, strip
 from sandmould.report.bed_mode import bed_mode
 from sandmould.report.drive import drive_of
 from sandmould.report.filling import FillingPages, filling_pages
-from sandmould.report.kinds.kind import Findings, KindPages, KindReport
+from sandmould.report.kinds.kind import Findings, FirstPicture, KindPages, KindReport
 from sandmould.report.loose_sand import loose_sand_pages
 from sandmould.report.method import measured_when, sand_method
 from sandmould.report.repose_figures import steepest_heaps
 from sandmould.report.robustness import robustness_pages
-from sandmould.report.sand import sand_pages
+from sandmould.report.sand import film_scene, sand_pages
 from sandmould.report.time_series import curve_figures
-from sandmould.runs.columns import LEAST_LIMIT_S, OVERLAP_P99_FRACTION, TIME_STEP_S, finished
-from sandmould.runs.formatting import number
+from sandmould.runs.columns import LEAST_LIMIT_S, OVERLAP_P99_FRACTION, RUN, TIME_STEP_S, finished
+from sandmould.runs.formatting import number, setting_text
 from sandmould.runs.templates import worded
 from sandmould.scenario.hardness import DEEP_OVERLAP, LEAST_KAPPA, bed_hardness
 from sandmould.scenario.scenario import Scenario
+from sandmould.statistics.verdict import Verdict
 from sandmould.study.collect import Collected
 from sandmould.wording.answer import sand_limits
 from sandmould.wording.grounds import sand_grounds
@@ -51,7 +52,9 @@ def _pages(findings: Findings[Scenario], film_budget_bytes: int) -> KindPages:
         from sandmould.report.bending import bending_pages  # scikit-fem: few studies need it
 
         bending = bending_pages(folder, href, scenario, of_sweep, verdict, run)
-    loose = loose_sand_pages(folder, run, of_sweep.summary, scenario)
+    loose = loose_sand_pages(folder, run, scenario, pages["height_m"])
+    surfaces = [loose["surface"]] if loose else []
+    pages["film_scene"] = film_scene(scenario, pages["height_m"], surfaces)
     return KindPages(
         "sand.html",
         sand_method(scenario, collected.keys, collected.summary),
@@ -59,17 +62,35 @@ def _pages(findings: Findings[Scenario], film_budget_bytes: int) -> KindPages:
         {
             "pages": pages,
             "bending": bending,
+            "has_rigid": any(o.name != scenario.pattern.name for o in scenario.obstacles)
+            if scenario.pattern is not None
+            else bool(scenario.obstacles),
             "loose": loose,
             "dimension": scenario.dimension,
             "vibrates": bool(scenario.vibrations),
             "ends_at_rest": scenario.ends_at_rest,
             "filling": filling,
         },
-        _sand_figures(pages, filling, bending, loose is not None),
+        _sand_figures(pages, filling, bending, loose),
+        _first_picture(pages, verdict, of_sweep),
         pages["beside"],
         grounds=sand_grounds(scenario, study, verdict, findings.scenarios),
         warning=_softness(scenario, of_sweep.summary),
     )
+
+
+def _first_picture(
+    pages: dict[str, Any], verdict: Verdict, collected: Collected
+) -> FirstPicture | None:
+    """The sand at its end; None without a snapshot."""
+    if not pages["panels"]:
+        return None
+    last = pages["panels"][-1]
+    of_run = collected.summary[collected.summary[RUN] == pages["pictured_run"]]
+    values = {key: of_run.iloc[0][key] for key in collected.keys}
+    said = f"the sand coloured by layer of fill, {last['heading']}."
+    caption = f"{setting_text(values)}: {said}" if values else said.capitalize()
+    return FirstPicture(last["by_layer"], last["alt"], caption)
 
 
 def _steps_above_limit(summary: pd.DataFrame) -> tuple[str, ...]:
@@ -105,15 +126,16 @@ def _sand_figures(
     pages: dict[str, Any],
     filling: FillingPages | None,
     bending: dict[str, Any] | None,
-    has_loose: bool,
+    loose: dict[str, Any] | None,
 ) -> dict[str, Chart | bytes]:
     """The sand at its moments, the pattern, filling over what is swept, and over time."""
     files: dict[str, Chart | bytes] = {}
     panels = pages["panels"]
     if panels:
-        files["sand"] = strip([(panel["heading"], panel["by_layer"]) for panel in panels])
-    if panels and has_loose:
+        files["sand"] = strip(pages["moments"])
+    if panels and loose:
         files["density"] = strip([(panel["heading"], panel["by_density"]) for panel in panels])
+        files |= pictures(loose=loose["picture"])
     if filling:
         files["filling"] = filling.chart
     if bending:

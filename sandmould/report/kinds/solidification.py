@@ -15,19 +15,23 @@ import pandas as pd
 from matplotlib.figure import Figure
 
 from sandmould.analysis.freezing import freezing
-from sandmould.analysis.freezing_plots import draw_freezing, draw_temperature
+from sandmould.analysis.freezing_plots import DistanceM, draw_freezing, draw_temperature
+from sandmould.casting.arpm.scene import solids_of
 from sandmould.definition.sweep import Point
 from sandmould.drawing.chart import Chart, Mark, tints
 from sandmould.drawing.figure_files import numbered, pictures
 from sandmould.drawing.figures import png
+from sandmould.drawing.sphere_film import bare_film
+from sandmould.drawing.sphere_scene import SurfaceField, solid_scene
 from sandmould.kinds.solidification.kind import SolidificationStudy
-from sandmould.report.kinds.kind import Findings, KindPages, KindReport
+from sandmould.report.kinds.kind import Findings, FirstPicture, KindPages, KindReport
 from sandmould.report.method import Row
 from sandmould.report.tables import Cell, Column, Table
 from sandmould.report.time_series import curve_figures, measure_curves
 from sandmould.runs.columns import CPU_S, RUN, SOLIDIFICATION_TIME_S, TIME_S, finished
 from sandmould.runs.formatting import is_number, listed, name_of, number, seconds, setting_text
 from sandmould.runs.templates import notes, worded
+from sandmould.scenario.casting.shapes import Body
 from sandmould.scenario.casting.solidification import MouldMaterial, Solidification
 from sandmould.statistics.answer import Answer
 from sandmould.statistics.refining import resolution_among
@@ -69,12 +73,14 @@ def _pages(findings: Findings[Solidification], film_budget_bytes: int) -> KindPa
     folder = findings.study_folder / "runs" / run
     probes = [f"{probe.name}_k" for probe in scenario.probes]
     curves = measure_curves(collected, verdict, [*probes, "solidified_fraction"])
-    fields, sentences, spots = _fields(folder, scenario)
+    fields, first, sentences, spots = _fields(folder, scenario)
     errors = _errors(reference, scenario, collected) if reference else []
     error_cost = _error_charts(errors)
     stand_ins = _stand_ins(findings.answer.stand_ins)
     shown = {
         "pictured_run": run,
+        "scene": _scene(folder, scenario) if fields else None,
+        "films": (bare_film(run),),
         "fields": fields,
         "sentences": (*sentences, *stand_ins),
         "spots": spots,
@@ -92,6 +98,7 @@ def _pages(findings: Findings[Solidification], film_budget_bytes: int) -> KindPa
             **numbered("error_cost", error_cost),
             **curve_figures(curves),
         },
+        picture=first,
         answer="" if study.seeks_best else _cheapest(errors, reference, collected),
         grounds=notes(
             "casting_grounds.j2",
@@ -144,20 +151,29 @@ def _of_point(summary: pd.DataFrame, reference: Point) -> pd.DataFrame:
     return summary[chosen]
 
 
-def _fields(folder: Path, scenario: Solidification) -> tuple[str, tuple[str, ...], Table | None]:
-    """Picture of a run's fields, what it says in words, and its hot spots."""
+def _fields(
+    folder: Path, scenario: Solidification
+) -> tuple[str, FirstPicture | None, tuple[str, ...], Table | None]:
+    """Pictures of a run's fields, what they say in words, and its hot spots."""
     if not (folder / "fields.npz").is_file():
-        return "", ("No run has left fields.",), None
+        return "", None, ("No run has left fields.",), None
     with np.load(folder / "fields.npz", allow_pickle=False) as file:
         fields = dict(file)
     melts = fields["melts"]
     frozen = freezing(
         fields["position_m"][melts], fields["frozen_s"][melts], scenario.hot_spot_reach_m
     )
+    distance_m = distance_from(solids_of(scenario))
     figure = Figure(figsize=(11, 4.6), dpi=110, layout="constrained")
     left, right = figure.subplots(1, 2)
-    draw_freezing(fields, frozen, left)
-    draw_temperature(fields, frozen, right)
+    draw_freezing(fields, frozen, left, distance_m)
+    draw_temperature(fields, frozen, right, distance_m)
+    alone = Figure(figsize=(5.6, 4.6), dpi=110, layout="constrained")
+    draw_freezing(fields, frozen, alone.subplots(), distance_m)
+    alt = f"When each part of the casting froze in run {folder.name}, with its outline"
+    caption = "When each part of the casting froze, and the part as drawn (line)"
+    where = ", cut through the last point to freeze" if scenario.dimensions == 3 else ""
+    first = FirstPicture(png(alone), alt, f"{caption}{where}.")
     is_solid = math.isfinite(frozen.solidification_time_s)
     said = worded("frozen.j2", it=frozen, is_solid=is_solid)
     axes = [Column(f"{name}, mm") for name in "yz"[: scenario.dimensions - 1]]
@@ -166,7 +182,29 @@ def _fields(folder: Path, scenario: Solidification) -> tuple[str, tuple[str, ...
         tuple(Cell(number(v, 4), str(v)) for v in (*(1e3 * place), time_s))
         for place, time_s in zip(frozen.hot_spots_m, frozen.hot_spot_s, strict=True)
     )
-    return png(figure), (said,), Table(columns, rows, (False,) * len(rows))
+    return png(figure), first, (said,), Table(columns, rows, (False,) * len(rows))
+
+
+def distance_from(solids: Sequence[Body]) -> DistanceM:
+    """How far places are from the nearest of some solids, negative inside."""
+    return lambda places_m: np.min([solid.distance_m(places_m) for solid in solids], axis=0)
+
+
+def _scene(folder: Path, scenario: Solidification) -> dict[str, object] | None:
+    """The casting for the 3D view, coloured by when it froze; None in two dimensions."""
+    if scenario.dimensions == 2:
+        return None
+    with np.load(folder / "fields.npz", allow_pickle=False) as file:
+        melts, size_m = file["melts"], float(file["size_m"].min())
+        place_m, frozen_s = file["position_m"][melts], file["frozen_s"][melts]
+    known = frozen_s[np.isfinite(frozen_s)]
+    if not len(known):
+        return None
+    low_s, high_s = float(known.min()), float(known.max())
+    ends = f"frozen after {number(low_s)} s", f"{number(high_s)} s"
+    field = SurfaceField("time of freezing", place_m, frozen_s, low_s, high_s, ends, size_m)
+    low_m, high_m = np.array(scenario.box.low_m), np.array(scenario.box.high_m)
+    return solid_scene(solids_of(scenario), low_m, high_m, [field])
 
 
 def _errors(point: Point, scenario: Solidification, collected: Collected) -> list[_Error]:

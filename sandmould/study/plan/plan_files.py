@@ -34,6 +34,7 @@ SUMMARY, CURVES = "summary.tsv", "curves.tsv"
 CHECKS = ("summary_checks.tsv", "curves_checks.tsv")
 """Tables of the runs that are no part of the sweep; only studies that have such runs."""
 REPORT_FILE = "report.html"
+SPREADSHEET = "report.xlsx"
 VERDICT_FILE = "verdict.txt"
 """The first sentence of the report, for the terminal and for programs."""
 FIGURES = "figures"

@@ -3,8 +3,9 @@
 from __future__ import annotations
 
 import numpy as np
+import pytest
 
-from sandmould.analysis.loose_zones import SIDES, LooseSand, find_loose_sand
+from sandmould.analysis.loose_zones import LOOSE, SIDES, LooseSand, find_loose_sand
 from sandmould.geometry.geometry import Block, Scene, Wall
 
 GRAIN_M = 0.001
@@ -61,7 +62,15 @@ def test_spheres_taken_from_under_a_block_leave_one_zone_under_it() -> None:
     assert under.all(axis=1).sum() == 6 * 6 * 3
     (zone,) = loose.zones
     assert zone.side == "under"
-    np.testing.assert_allclose(zone.place_m, [0.007, 0.007, 0.0065], atol=0.0005)
+    middle_m = 0.5 * (zone.low_m + zone.high_m)
+    np.testing.assert_allclose(middle_m, [0.007, 0.007, 0.0065], atol=0.0005)
+    assert (zone.near, zone.is_inside) == (BLOCK.name, False)
+    own = loose.field.zone == 1
+    # loose is what lies below 0.9 of the usual there
+    assert (loose.field.share[own] < LOOSE).all()
+    assert own.sum() * loose.field.cell_m**3 == pytest.approx(zone.measure)
+    x_m = loose.field.low_m[0] + loose.field.cell_m * np.flatnonzero(own.any(axis=(1, 2)))
+    assert (x_m[0], x_m[-1]) == pytest.approx((zone.low_m[0], zone.high_m[0]))
     # the space of 108 cells; its border is known to the ball's radius of 1.5 grains
     assert 4 * 4 * 2 < zone.measure / GRAIN_M**3 < 9 * 9 * 6
     assert zone.solid_fraction < 0.3

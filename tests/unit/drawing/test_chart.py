@@ -43,6 +43,16 @@ def test_curves_fill_the_axes_and_labels_keep_apart(drawing: tuple[int, int]) ->
     assert laid.x.end + 9 + widest <= laid.width
 
 
+def test_labels_of_means_that_end_early_stand_beyond_all_curves() -> None:
+    short, whole = np.array([[0.0, 0.5], [0.6, 0.4]]), np.array([[0.0, 0.5], [1.0, 0.4]])
+    lines = (Line(short, style="mean", label="5 mm"), Line(whole, style="mean", label="1 mm"))
+    laid = lay_out(Chart("time, s", "fill", "alt", (*lines, Line(short, label="best"))), WIDE)
+    early, late, upright = laid.lines
+    assert early.end[0] < late.end[0]
+    assert early.label_x == late.label_x > laid.x.end
+    assert upright.end[0] < upright.label_x < laid.x.end
+
+
 def test_ticks_are_round_and_inside() -> None:
     laid = lay_out(Chart("time, s", "fill", "alt", (curve(0.62),)), WIDE)
     assert [t.text for t in laid.x_ticks][:3] == ["0.0", "0.2", "0.4"]

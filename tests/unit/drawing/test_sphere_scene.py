@@ -5,14 +5,24 @@ from __future__ import annotations
 import base64
 import json
 import zlib
+from dataclasses import replace
 from pathlib import Path
-from typing import Any
+from typing import Any, cast
 
 import numpy as np
 import pytest
 
 from sandmould.drawing.figures import dimensioned
-from sandmould.drawing.sphere_scene import MOST_TRIANGLES, SIDES, sharp_edges, sphere_scene
+from sandmould.drawing.sphere_scene import (
+    MOST_TRIANGLES,
+    SIDES,
+    UNKNOWN,
+    SurfaceField,
+    sharp_edges,
+    solid_scene,
+    sphere_scene,
+)
+from sandmould.geometry.geometry import Block
 from sandmould.report.scene_page import draw_scene_file
 from sandmould.scenario.scenario import Scenario
 from tests.hopper import DEEP, hopper_scene
@@ -119,3 +129,34 @@ def test_a_scene_before_anything_runs_shows_its_part_and_its_sizes_in_mm(tmp_pat
     assert json.loads(told)["solid_tint"][-1] > 0.7 > tint[-1]
     (ax,) = dimensioned(scenario, None).axes
     assert {"100 mm"} <= {text.get_text() for text in ax.texts}
+
+
+def test_a_field_colours_a_surface_cut_to_its_places_and_is_not_known_far_from_them() -> None:
+    """The places lie on the block's lower half, their value is x."""
+    block = Block("part", np.full(3, 0.01), np.full(3, 0.01), np.eye(3))
+    x = 0.001 * np.arange(21)
+    place_m = np.stack(np.meshgrid(x, x, x[:11], indexing="ij"), axis=-1).reshape(-1, 3)
+    field = SurfaceField("x", place_m, place_m[:, 0], 0.0, 0.02, ("0", "20 mm"), 0.001)
+    from_m = np.full(3, 0.5)
+    moved = replace(field, place_m=place_m + from_m)
+    shifted = Block("part", block.centre_m + from_m, block.half_size_m, np.eye(3))
+    for scene in (
+        solid_scene([block], np.zeros(3), np.full(3, 0.02), [field]),
+        solid_scene([shifted], from_m, from_m + 0.02, [moved]),
+    ):
+        (solid,) = cast(list[dict[str, Any]], scene["solids"])
+        raw = zlib.decompress(base64.b64decode(solid["data"]))
+        vertices = np.frombuffer(raw, "<f4", 3 * solid["vertices"]).reshape(-1, 3)
+        triangles = np.frombuffer(raw, "<u4", 3 * solid["triangles"], vertices.nbytes)
+        shades = np.frombuffer(raw, np.uint8)[-solid["vertices"] :]
+        corners = vertices[triangles.reshape(-1, 3)]
+        sides = np.linalg.norm(np.roll(corners, -1, axis=1) - corners, axis=2)
+        assert sides.max() <= 0.001 * (1 + 1e-4)
+        assert volume_m3(vertices, triangles.reshape(-1, 3)) == pytest.approx(0.02**3, rel=1e-5)
+        assert solid["edges"] == 12
+        low = vertices[:, 2] <= 0.01
+        # the nearest place is half of their distance away at the most
+        assert np.abs(shades[low] / 254 - vertices[low, 0] / 0.02).max() <= 0.5 / 20 + 0.5 / 254
+        assert (shades[vertices[:, 2] > 0.0121] == UNKNOWN).all()
+    assert scene["from_m"] == from_m.tolist()
+    assert scene["fields"] == [{"title": "x", "ends": ("0", "20 mm")}]

@@ -16,7 +16,6 @@ from sandmould.kinds.sand.loose import (
     write_loose_zones,
 )
 from sandmould.report.loose_sand import loose_sand_pages
-from sandmould.runs.columns import RUN
 from sandmould.scenario.sand import Sand
 from sandmould.scenario.scenario import Scenario
 
@@ -65,22 +64,31 @@ def test_a_hollow_under_a_plate_is_measured_and_told(folder: Path) -> None:
     assert last["loose_over_fraction"] == 0.0
     assert last["loose_zones"] == 1
     write_loose_zones(loose, run / LOOSE_ZONES)
-    pages = loose_sand_pages(folder, "one", pd.DataFrame([{RUN: "one", **last}]), scene())
+    (written,) = pd.read_csv(run / LOOSE_ZONES, sep="\t").to_dict("records")
+    assert (written["side"], written["near"]) == ("under", "part")
+    assert written["z_from_m"] < written["z_to_m"] <= 0.008
+    pages = loose_sand_pages(folder, "one", scene(), 0.02)
     assert pages is not None
     assert last["loose_under_fraction"] == 1.0
+    assert pages["picture"].startswith("data:image/png;base64,")
     sentence = (
         "Sand lies loose at 100 % of the places straight under the obstacles, 0 % of the places"
     )
-    assert pages["sentence"].startswith(sentence)
+    assert pages["sentences"][0].startswith(sentence)
+    share = f"{100 * last['loose_away_fraction']:.1f} %"
+    assert pages["sentences"][1].startswith(f"By chance and in corners it is {share}: the share")
     (row,) = pages["table"].rows
-    assert [cell.text for cell in row[:2]] == ["under", "7, 7, 6"]
-    assert float(row[3].sort) == pytest.approx(
+    assert [cell.text for cell in row[:2]] == ["1", "under the part"]
+    for cell, axis in zip(row[2:5], "xyz", strict=True):
+        ends_mm = [1e3 * written[f"{axis}_{end}_m"] for end in ("from", "to")]
+        # in whole mm
+        assert [float(end) for end in cell.text.split(" to ")] == pytest.approx(ends_mm, abs=0.51)
+    assert float(row[6].sort) == pytest.approx(
         last["largest_loose_zone_m3"] / (np.pi / 6 * GRAIN_M**3), rel=1e-4
     )
-    assert pages["note"] == ""
 
 
 def test_none_is_sought_in_2d_without_obstacles_or_through_a_gate(folder: Path) -> None:
     assert last_loose_sand(Scenario(dimension=3), folder / "runs" / "one") is None
     assert last_loose_sand(Scenario(), folder / "runs" / "one") is None
-    assert loose_sand_pages(folder, "one", pd.DataFrame([{RUN: "one"}]), scene()) is None
+    assert loose_sand_pages(folder, "", scene(), 0.02) is None

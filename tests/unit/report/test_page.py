@@ -122,8 +122,17 @@ def test_every_picture_is_told(text: str) -> None:
     assert re.findall(r"<b>Figure (\d+)\.</b>", text) == [str(n + 1) for n in range(figures)]
 
 
+def test_the_first_screen_shows_the_sand_of_the_best_setting(text: str) -> None:
+    found = re.search(r'<figure class="paper look">.*?</figure>', text, re.S)
+    assert found is not None
+    assert text.index("</figure>") < text.index('id="details"')
+    assert 'src="data:image/png;base64,' in found.group()
+    assert "50 Hz: the sand coloured by layer of fill, " in found.group()
+
+
 def test_the_table_of_runs_folds_in_a_frame_that_scrolls(text: str) -> None:
-    folded = text[text.index('<details id="runs-table">') : text.index("</details>")]
+    start = text.index('<details id="runs-table">')
+    folded = text[start : text.index("</details>", start)]
     assert "<summary>Table of 9 runs</summary>" in folded
     assert '<div class="scroll" tabindex="0" role="region" aria-label="Runs">' in folded
     assert folded.count("<tr") == 10

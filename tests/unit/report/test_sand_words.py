@@ -2,13 +2,20 @@
 
 from __future__ import annotations
 
+from pathlib import Path
+
+import numpy as np
 import pandas as pd
 import pytest
 
-from sandmould.report.sand import _density_conclusion, _role_text
+from sandmould.engines.snapshot import Snapshot
+from sandmould.report.sand import _density_conclusion, _role_text, pictured_runs
 from sandmould.statistics.verdict import Verdict, compare_settings
 
 FILL = "tube_fill_fraction"
+ONE = np.ones(1)
+STILL = Snapshot(0.1, np.nan, "settle_1", ONE.astype(int), ONE.astype(int), np.zeros((1, 2)),
+                 np.zeros((1, 2)), np.zeros((1, 1)), ONE)  # fmt: skip
 
 
 def _judged() -> tuple[Verdict, pd.DataFrame]:
@@ -28,6 +35,23 @@ def _judged() -> tuple[Verdict, pd.DataFrame]:
 def test_a_pictured_run_is_told_by_its_value(role: str, said: str) -> None:
     verdict, table = _judged()
     assert _role_text(role, verdict, table) == said
+
+
+def test_of_the_best_setting_the_run_in_the_middle_is_pictured(tmp_path: Path) -> None:
+    fills = {"a": (25.0, 0.6), "b": (25.0, 0.1), "c": (50.0, 0.55), "d": (50.0, 0.5),
+             "e": (50.0, 0.4)}  # fmt: skip
+    table = pd.DataFrame(
+        [{"run": run, "f_hz": f_hz, FILL: fill, "outcome_code": 0}
+         for run, (f_hz, fill) in fills.items()]
+    )  # fmt: skip
+    for run in fills:
+        (tmp_path / "runs" / run / "snapshots").mkdir(parents=True)
+        STILL.save(tmp_path / "runs" / run / "snapshots" / "000000.npz")
+    verdict = compare_settings(table, ["f_hz"], FILL)
+    assert pictured_runs(tmp_path, table, verdict) == {"best": "d", "worst": "b"}
+    assert _role_text("best", verdict, table) == (
+        "in the middle of those with the highest mean fill of the tube"
+    )
 
 
 @pytest.mark.parametrize(
