@@ -58,14 +58,14 @@ MEASURES: tuple[MeasureGroup[Scenario], ...] = read_groups(
         ),
         "with a discharge through an upright gate": _where(lambda s: _gate(s, is_level=False)),
         "with a pattern": _with_pattern,
-        "with a pattern and its tolerance": _where(
+        "with pattern.tolerance_m": _where(
             lambda s: s.pattern is not None and s.pattern.tolerance_m is not None
         ),
-        "with a pattern and its crushing strength": _where(
+        "with pattern.crush_strength_pa": _where(
             lambda s: s.pattern is not None and s.pattern.crush_strength_pa is not None
         ),
-        "with a pattern, in 3D": _in(3, _with_pattern),
-        "with a pattern that moves in every step (in_step, monolithic)": _where(
+        "with 3D patterns": _in(3, _with_pattern),
+        "with stepped patterns": _where(
             lambda s: s.pattern is not None and not s.pattern.loop.has_windows
         ),
         "with a pattern, in 2D": _in(2, _with_pattern),
