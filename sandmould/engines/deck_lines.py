@@ -63,7 +63,7 @@ class Lines:
         given = getattr(self._section(path), last)
         sand, contact = self.scenario.sand, self.scenario.contact
         if key == "sand.disc_thickness_m" and given == "grain":
-            return sand.thickness_m, ", the mass-median diameter"
+            return sand.thickness_m, ", the median diameter"
         if not key.endswith("_stiffness_n_m"):
             return given, ""
         _, law, spring = key.split(".")
