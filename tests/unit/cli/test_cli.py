@@ -264,7 +264,7 @@ def test_a_scene_that_lacks_the_measure_asked_for_is_drawn_all_the_same(elsewher
 @pytest.mark.parametrize(
     ("arguments", "sentence"),
     [
-        (("plates",), "STUDY = 'plates' cannot be used: valid is a study of kind sand: one of"),
+        (("tank_small",), "STUDY = 'tank_small' cannot be used: valid is a study of sand or so"),
         (("tube_demo", "-o", "a.pdf"), "--output = 'a.pdf' cannot be used: valid is a file that"),
         (("tube_demo", "-o", "no/a.png"), "--output = 'no/a.png' cannot be used: valid is a file"),
         (("tube_demo", "--run", "x"), "--run = 'x' cannot be used: valid is a run of tube_demo: f"),
