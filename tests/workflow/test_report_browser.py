@@ -195,7 +195,11 @@ def test_slider_sets_the_time(page: webdriver.Chrome) -> None:
 def test_run_selector_switches_at_the_same_moment(page: webdriver.Chrome) -> None:
     slide(page, 15)
     choice = Select(page.find_element(By.ID, "film-run"))
-    assert [o.text for o in choice.options] == ["best setting: 50 Hz", "median: 100 Hz", "lowest: 25 Hz"]
+    assert [o.text for o in choice.options] == [
+        "best setting: 50 Hz",
+        "median: 100 Hz",
+        "lowest: 25 Hz",
+    ]
     choice.select_by_visible_text("lowest: 25 Hz")
     wait(
         lambda: (
