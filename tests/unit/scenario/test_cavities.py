@@ -186,7 +186,7 @@ CASES: dict[str, tuple[int, str, str]] = {
 @pytest.mark.parametrize("case", CASES, ids=[c.replace(" ", "_") for c in CASES])
 def test_sentence(case: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     dimension, cavities, sentence = CASES[case]
-    write_stl(tmp_path / "open.stl", CORNERS, FACETS[1:])
+    write_stl(tmp_path / "open.stl", CORNERS, FACETS[:1])
     text = f"based_on: tube\n{NO_OBJECTIVE}scenario: {{{SCENES[dimension]}cavities: [{cavities}]}}"
     told = refused(tmp_path, text, monkeypatch)
     if sentence:

@@ -91,12 +91,12 @@ CASES: dict[str, tuple[str | bytes, str]] = {
     "missing material": (
         "based_on: tube\nmaterial: silica",
         "trial.yaml: material = 'silica' cannot be used: valid is the name of a material of "
-        "kind sand: rojek_2004.",
+        "kind sand: duck_beach, lbi_beach, rojek_2004.",
     ),
     "material of another kind": (
         "based_on: tube\nmaterial: hirata_2019",
         "trial.yaml: material = 'hirata_2019' cannot be used: valid is the name of a material of "
-        "kind sand: rojek_2004.",
+        "kind sand: duck_beach, lbi_beach, rojek_2004.",
     ),
     "material that no kind can use": (
         "based_on: plates\nmaterial: hirata_2019_aluminium",

@@ -78,7 +78,7 @@ CASES: dict[str, tuple[str, str]] = {
         "with which objective.measure, here pattern_residual_fraction, is a measure that this "
         "scene will have (pattern_residual_fraction: with a pattern, in all schemes but "
         "monolithic): nearest are pattern_stored_fraction, pattern_outside_fraction, "
-        "pattern_under_fraction; sandmould measures lists all.",
+        "pattern_frequency_fraction; sandmould measures lists all.",
     ),
 }
 

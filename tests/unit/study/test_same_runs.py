@@ -164,9 +164,10 @@ def finish(plan: Plan) -> None:
             "scenario_sha256": scenario_hash(run.scenario),
             "template_sha256": planning.template_hash(run.scenario),
         }
-        write_manifest(folder, "computed", {}, origin, {"wall_s": 1.0})
+        outcome = RunOutcome(Outcome.FINISHED, "", 1.0, 1.0)
+        write_manifest(folder, "computed", {}, origin, {"wall_s": 1.0}, outcome=outcome.text)
         write_manifest(folder, "measured", {}, code=planning.measuring_hash)
-        RunOutcome(Outcome.FINISHED, "", 1.0, 1.0).write(folder / "outcome.json")
+        outcome.write(folder / "outcome.json")
 
 
 def check_whole(studies: Path = Path()) -> None:
