@@ -318,13 +318,11 @@ def show(
     ] = None,
 ) -> None:  # fmt: skip
     """Draw a scene of sand, or a casting, to scale before anything runs."""
-    from sandmould.report.scene_page import draw_scene_file
+    from sandmould.report.scene_page import draw_scene_file, usual_ending
     from sandmould.study.plan.drawn_run import drawn_run
 
     opened, shown = drawn_run(study, run)
-    flat = "dimension" if opened.study.kind == "sand" else "dimensions"
-    ending = "png" if getattr(shown.scenario, flat) == 2 else "html"
-    out = output or Path(f"{opened.name}_scene.{ending}")
+    out = output or Path(f"{opened.name}_scene{usual_ending(shown.scenario)}")
     draw_scene_file(shown.scenario, opened.study.title or opened.name, shown.run, out)
     typer.echo(out)
 

@@ -40,6 +40,13 @@ ENDINGS = (".html", ".png", ".svg")
 _DPI = 160
 
 
+def usual_ending(scenario: Scenario | Solidification) -> str:
+    """A picture of a plane scene, a page that can be turned of one in space."""
+    if isinstance(scenario, Solidification):
+        return ENDINGS[1] if scenario.dimensions == 2 else ENDINGS[0]
+    return ENDINGS[1] if scenario.dimension == 2 else ENDINGS[0]
+
+
 def draw_scene_file(scenario: Scenario | Solidification, title: str, run: str, out: Path) -> None:
     """Draw box, solids, cavities, likely grains and vibration to scale, or a casting in its box.
 
