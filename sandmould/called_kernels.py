@@ -6,6 +6,7 @@ Apart from what compiles, so that no change of what calls this has all kernels c
 from __future__ import annotations
 
 import contextlib
+import inspect
 import json
 import os
 import sys
@@ -16,6 +17,7 @@ from typing import Any
 import numba
 import numpy as np
 from numba import types
+from numba.core.dispatcher import Dispatcher
 
 from sandmould.compiled import DISPATCHERS, FOLDER, KEEPS
 
@@ -27,6 +29,8 @@ def loaded_kernels() -> set[str]:
     """
     kernels = set()
     for name, dispatcher in DISPATCHERS.items():
+        if not dispatcher.signatures or _starts_threads(dispatcher):
+            continue
         for signature in dispatcher.signatures:
             with contextlib.suppress(TypeError):
                 kernels.add(json.dumps([name, [_described(each) for each in signature]]))
@@ -37,7 +41,7 @@ def load_kernels(kernels: Iterable[str]) -> None:
     """Load functions before they are called, as another process had them; none is called."""
     for kernel in kernels:
         name, described = json.loads(kernel)
-        if name in DISPATCHERS:
+        if name in DISPATCHERS and not _starts_threads(DISPATCHERS[name]):
             DISPATCHERS[name].compile(tuple(_type_of(each) for each in described))
 
 
@@ -60,6 +64,20 @@ def kept_kernels(of: str) -> set[str]:
 
 def _kept_file(of: str) -> Path:
     return FOLDER / f"called_{of}.txt"
+
+
+def _starts_threads(dispatcher: Any) -> bool:
+    """Whether a function calls, at any depth, a parallel one.
+
+    Threads would not live on in a fork. And Numba notes that a function needs them where it
+    compiles its callees too: kept with callees that came from the disk, and loaded before any
+    thread was started, it lacks their symbols and crashes where it is called.
+    """
+    if dispatcher not in DISPATCHERS.values():
+        return True
+    seen = inspect.getclosurevars(dispatcher.py_func)
+    named = (*seen.globals.values(), *seen.nonlocals.values())
+    return any(isinstance(each, Dispatcher) and _starts_threads(each) for each in named)
 
 
 def _described(kind: Any) -> Any:

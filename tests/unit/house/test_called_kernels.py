@@ -6,6 +6,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from numba import prange
 
 from sandmould import called_kernels
 from sandmould.called_kernels import keep_kernels, kept_kernels, load_kernels, loaded_kernels
@@ -50,3 +51,35 @@ def test_a_damaged_list_stops_no_run(kept: Path) -> None:
     before = loaded_kernels()
     load_for(scenario)
     assert loaded_kernels() == before
+
+
+def test_what_calls_parallel_code_is_not_loaded_before_it_is_called(kept: Path) -> None:
+    @njit(parallel=True)
+    def shared_out(values):  # type: ignore[no-untyped-def]
+        for i in prange(len(values)):
+            values[i] += 1.0
+
+    @njit()
+    def between(values):  # type: ignore[no-untyped-def]
+        shared_out(values)
+
+    @njit()
+    def caller(values):  # type: ignore[no-untyped-def]
+        between(values)
+
+    @njit()
+    def alone(values):  # type: ignore[no-untyped-def]
+        return values.sum()
+
+    before = loaded_kernels()
+    caller(np.ones(3))
+    alone(np.ones(3))
+    (called,) = loaded_kernels() - before
+    assert "alone" in called
+
+    @njit()
+    def later(values):  # type: ignore[no-untyped-def]
+        between(values)
+
+    load_kernels([called.replace("alone", "later")])
+    assert later.signatures == []  # type: ignore[attr-defined]
