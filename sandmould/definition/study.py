@@ -116,6 +116,16 @@ class Study(Section):
         return self.refine.rounds > 0 and self.refine.adds == "replicates"
 
     @property
+    def grain_price_share(self) -> float:
+        """Share of the sweep's price that its best settings may take with coarser grains."""
+        return 0.0
+
+    @property
+    def decides_more(self) -> bool:
+        """Whether runs may follow that only those of the sweep tell."""
+        return bool(self.refine.rounds or self.certificate.controls or self.grain_price_share)
+
+    @property
     def trusts_program(self) -> bool:
         """Whether the user lets its runs execute a program that is not shipped."""
         return False

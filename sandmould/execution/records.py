@@ -41,8 +41,7 @@ from sandmould.runs.hashing import scenario_hash
 from sandmould.runs.manifest import read_manifest
 from sandmould.runs.outcome import Outcome
 from sandmould.study.collect import read_collected, read_summary
-from sandmould.study.plan.build_plan import open_plan
-from sandmould.study.plan.expand import expand
+from sandmould.study.plan.build_plan import open_plan, planned_runs
 from sandmould.study.plan.load_study import OpenStudy, open_study
 from sandmould.study.plan.plan_files import CHECKS, FIGURES, SUMMARY
 from sandmould.study.rounds.round_log import ROUNDS_FILE, read_rounds
@@ -91,8 +90,7 @@ def _computed_hash(run: Run) -> str:
 
 def runs_in(study: OpenStudy, folder: Path) -> list[Run]:
     """All runs of a study, with those of the rounds that a folder keeps."""
-    log = read_rounds(folder, study.study)
-    return expand(study, log.runs, log.certified_hz)
+    return planned_runs(study, read_rounds(folder, study.study))
 
 
 def record(path: Path, results: Path, figures: Sequence[str] = ()) -> Path:

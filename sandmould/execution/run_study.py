@@ -76,7 +76,7 @@ def _compute(plan: Plan, options: Sequence[str], opening: str) -> int:
         print(f"{plan.study.name}: {runs} of {runs} runs done, nothing left", file=sys.stderr)
         print(f"{opening} {last_line(folder)}".strip())
         return 0
-    while study.refine.rounds or study.certificate.controls:
+    while study.decides_more:
         if _snakemake(plan, options, [str(folder / SUMMARY)]):
             # Stopped, or broken outside the runs: a run that fails leaves its outcome.
             return 1

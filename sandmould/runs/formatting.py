@@ -159,6 +159,15 @@ def display_number(key: str, value: float, digits: int = 3) -> str:
     return f"{number(factor * value, digits)} {unit}".rstrip()
 
 
+def display_range(key: str, low: float, high: float) -> str:
+    """An interval of a measure with its unit as it is shown, to the second digit of its width."""
+    factor, unit = (1e3, "mm") if unit_of(key) == "m" else (1.0, unit_of(key))
+    width = factor * (high - low)
+    places = max(0, 1 - math.floor(math.log10(width))) if width > 0.0 else 3
+    text = f"{factor * low:.{places}f} to {factor * high:.{places}f} {unit}"
+    return text.replace("-", "−").rstrip()
+
+
 def value_text(key: str, value: Any) -> str:
     """A swept value with its unit."""
     if isinstance(value, float | int) and not isinstance(value, bool):

@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 from sandmould import SHIPPED
 from sandmould.runs.formatting import (
     display_number,
+    display_range,
     listed,
     name_of,
     number,
@@ -42,7 +43,7 @@ def _environment() -> Environment:
     )
     filters = (listed, number, rounded, seconds)
     environment.filters |= {it.__name__: it for it in filters} | {"name": name_of}
-    called = (display_number, range_text, value_text, with_margin)
+    called = (display_number, display_range, range_text, value_text, with_margin)
     environment.globals |= {it.__name__: it for it in called}
     return environment
 

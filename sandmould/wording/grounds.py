@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 
 from sandmould.definition.certificate import frequency_key
 from sandmould.definition.study import Study
@@ -42,7 +42,11 @@ def scatter_grounds(verdict: Verdict, differ_in: str, seeks_best: bool) -> tuple
 
 
 def sand_grounds(
-    scenario: Scenario, study: Study, verdict: Verdict, by_setting: Mapping[str, Scenario]
+    scenario: Scenario,
+    study: Study,
+    verdict: Verdict,
+    by_setting: Mapping[str, Scenario],
+    of_grains: Sequence[str] = (),
 ) -> tuple[Note, ...]:
     """Say how sure the answer of a study of sand is.
 
@@ -54,6 +58,8 @@ def sand_grounds(
     verdict : Verdict
     by_setting : mapping of str to Scenario
         By label of the setting.
+    of_grains : sequence of str
+        What runs with coarser grains say; empty where there are none.
     """
     vibrations = scenario.vibrations
     return scatter_grounds(verdict, "random fillings", study.seeks_best) + notes(
@@ -64,5 +70,6 @@ def sand_grounds(
         hold=vibrations[0].hold if vibrations else "",
         narrow=narrow_spaces(scenario),
         scale=scenario.sand.size_scale,
+        of_grains=of_grains,
         weak=[label for label, each in by_setting.items() if throws_no_sand(each)],
     )

@@ -6,6 +6,7 @@ from typing import TYPE_CHECKING, Literal
 
 from pydantic import Field
 
+from sandmould.definition.grain_check import FEWEST, GrainCheck
 from sandmould.definition.study import Study, kind_key
 from sandmould.definition.table import VibratingTable
 from sandmould.kinds.kind import Kind, opened_later
@@ -34,6 +35,20 @@ class SandStudy(Study):
     table: VibratingTable = Field(
         VibratingTable(), description="What your table can do: settings beyond it are left out."
     )
+
+    grain_check: GrainCheck = Field(
+        GrainCheck(), description="What the size of the model's grains does, by runs of its own."
+    )
+
+    @property
+    def grain_price_share(self) -> float:
+        """See ``Study``."""
+        scale = self.scenario.sand.size_scale
+        enough = self.replicates >= FEWEST or self.adds_replicates
+        asked = self.seeks_best and not self.calibration.sands
+        swept = any(key.startswith("sand.") for key in self.sweep.swept)
+        is_due = asked and enough and scale > 1.0 and not swept
+        return self.grain_check.price_share if is_due else 0.0
 
     def table_limit(self, scenario: Scenario) -> str:
         """See ``Study``; a vibration during the fill counts too."""

@@ -11,6 +11,7 @@ from sandmould.drawing.figure_files import pictures, strip
 from sandmould.report.bed_mode import bed_mode
 from sandmould.report.drive import drive_of
 from sandmould.report.filling import FillingPages, filling_pages
+from sandmould.report.grain_size import grain_size_pages
 from sandmould.report.kinds.kind import Findings, FirstPicture, KindPages, KindReport
 from sandmould.report.loose_sand import loose_sand_pages
 from sandmould.report.method import measured_when, sand_method
@@ -54,6 +55,8 @@ def _pages(findings: Findings[Scenario], film_budget_bytes: int) -> KindPages:
         bending = bending_pages(folder, href, scenario, of_sweep, verdict, run)
     loose = loose_sand_pages(folder, run, scenario, pages["height_m"])
     surfaces = [loose["surface"]] if loose else []
+    best = verdict.best.label if verdict.best else ""
+    grain_size = grain_size_pages(study, collected, scenario, best) if verdict.best else None
     pages["film_scene"] = film_scene(scenario, pages["height_m"], surfaces)
     return KindPages(
         "sand.html",
@@ -70,11 +73,14 @@ def _pages(findings: Findings[Scenario], film_budget_bytes: int) -> KindPages:
             "vibrates": bool(scenario.vibrations),
             "ends_at_rest": scenario.ends_at_rest,
             "filling": filling,
+            "grain_size": grain_size,
         },
         _sand_figures(pages, filling, bending, loose),
         _first_picture(pages, verdict, of_sweep),
         pages["beside"],
-        grounds=sand_grounds(scenario, study, verdict, findings.scenarios),
+        grounds=sand_grounds(
+            scenario, study, verdict, findings.scenarios, grain_size.sentences if grain_size else ()
+        ),
         warning=_softness(scenario, of_sweep.summary),
     )
 

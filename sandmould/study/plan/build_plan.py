@@ -22,7 +22,7 @@ from sandmould.kinds.kind import AnyScenario, Kind, Planning, SpeedClass
 from sandmould.kinds.registry import kind_named
 from sandmould.runs.words import say
 from sandmould.study.plan.batches import Batch, mark_done, plan_batches
-from sandmould.study.plan.expand import expand, swept_key
+from sandmould.study.plan.expand import coarser_runs, expand, swept_key
 from sandmould.study.plan.fills import planned_work, share_fills
 from sandmould.study.plan.lacking import Lack, Need, lacks, note_lacks
 from sandmould.study.plan.later_key import at_later_key
@@ -31,14 +31,14 @@ from sandmould.study.plan.measured import problems_elsewhere
 from sandmould.study.plan.ownership import check_owner, write_owner
 from sandmould.study.plan.plan_files import (
     beyond_line,
-    later_line,
+    later_lines,
     plan_table,
     write_plan,
     write_study,
 )
 from sandmould.study.plan.price import Prices, computed_wall_s, ratios_of
 from sandmould.study.plan.trust import check_letters, check_places, check_trust, may_run
-from sandmould.study.rounds.round_log import read_rounds
+from sandmould.study.rounds.round_log import RoundLog, read_rounds
 
 RESULTS = Path("results")
 MEASURING_S = 10.0
@@ -225,6 +225,12 @@ def open_plan(path: Path, results: Path = RESULTS, text: str | None = None) -> P
     return Plan(study, tuple(shared), tuple(fills), tuple(_later(runs, trial, fills, planning)))
 
 
+def planned_runs(study: OpenStudy, log: RoundLog) -> list[Run]:
+    """Runs of a study with those of its rounds and of what they have decided."""
+    runs = expand(study, log.runs, log.certified_hz)
+    return [*runs, *coarser_runs(study, log.coarsened or (), runs)] if log.coarsened else runs
+
+
 def _misfits(files: Sequence[StudyFile]) -> set[str]:
     """Keys of what is wrong with a study of some files, without results."""
     try:
@@ -237,12 +243,16 @@ def _misfits(files: Sequence[StudyFile]) -> set[str]:
 def _sound_runs(study: OpenStudy, results: Path) -> tuple[list[Run], list[Run]]:
     """Runs of a study and of a trial of its controls, all of which their engines can compute."""
     log = read_rounds(results / study.name, study.study)
-    runs = expand(study, log.runs, log.certified_hz)
+    runs = planned_runs(study, log)
     problems: dict[str, Problem] = {}
     # Controls come hours later, at frequencies that are not known yet: they are tried at others.
     certificate = study.study.certificate
     trial_hz = provisional_hz(certificate, study.study.sweep, study.study.scenario)
-    trial = expand(study, (), trial_hz) if trial_hz and not log.certified_hz else []
+    trial_hz = () if log.certified_hz else trial_hz
+    trial = expand(study, (), trial_hz) if trial_hz else []
+    if study.study.grain_price_share and log.coarsened is None:
+        first = points(study.study.sweep, study.study.scenario)
+        trial += coarser_runs(study, first, runs)
     planning = kind_named(study.study.kind).planning
     for run in (*runs, *trial):
         problem = planning.engine_problem(run.scenario)
@@ -405,7 +415,7 @@ def price(plan: Plan, results: Path, cores: int) -> str:
     return (
         plan_table([*plan.fills, *plan.runs], prices, cores)
         + beyond_line(plan.beyond_table)
-        + later_line(plan.later, prices, cores)
+        + later_lines(plan.later, prices, cores)
     )
 
 

@@ -11,6 +11,7 @@ from typing import Any
 import yaml
 from pydantic import create_model
 
+from sandmould.definition.grain_check import FACTOR
 from sandmould.definition.run import FILL, Part, Run
 from sandmould.definition.study import Study
 from sandmould.definition.sweep import Point
@@ -25,6 +26,7 @@ from sandmould.scenario.reading import Origin, read_planned, validated
 from sandmould.statistics.control_case import SPRINGS
 from sandmould.study.plan.fills import planned_work
 from sandmould.study.plan.price import Prices, study_s
+from sandmould.study.robustness.controls import COARSER
 
 SCENARIO_FILE = "scenario.yaml"
 """A run as planned: what its jobs and its report read."""
@@ -225,8 +227,8 @@ def plan_table(runs: Sequence[Run], prices: Prices, cores: int) -> str:
         scenario = alike[0].scenario
         work_a_run = prices.work(alike[0])
         work += work_a_run * len(alike)
-        # a fill has nothing to tell that its runs have not
-        for note in () if alike[0].part == FILL else planning.notes(scenario):
+        # a fill has nothing to tell that its runs have not, coarser grains are no setting
+        for note in () if alike[0].part in (FILL, COARSER.part) else planning.notes(scenario):
             notes.setdefault(note.about, []).append((alike[0].run.rsplit("_r", 1)[0], note))
         if len(rows) <= LISTED_POINTS:
             rows.append(
@@ -250,7 +252,9 @@ def plan_table(runs: Sequence[Run], prices: Prices, cores: int) -> str:
         f"{len(runs) - len(fills)} runs, {work:.3g} {planning.work_unit}. Wall time on {cores} "
         f"cores with report: {whole}, {prices.basis(runs)}"
     )
-    settings = [alike[0].scenario for alike in points.values() if alike[0].part != FILL]
+    settings = [
+        alike[0].scenario for alike in points.values() if alike[0].part not in (FILL, COARSER.part)
+    ]
     lines += planning.settings_lines(settings)
     lines += [_note_line(told, len(settings)) for told in notes.values()]
     return "\n".join(line.rstrip() for line in lines) + "\n"
@@ -264,28 +268,40 @@ def beyond_line(left_out: Sequence[Point]) -> str:
     return f"Left out, since your table cannot do it: {told}.\n"
 
 
-def later_line(later: Sequence[Run], prices: Prices, cores: int) -> str:
-    """What the controls of an optimum will take, as a line; empty where there are none to come.
+def later_lines(later: Sequence[Run], prices: Prices, cores: int) -> str:
+    """What controls of the best setting will take, a line a sort; empty where none are to come.
 
     Parameters
     ----------
     later : sequence of Run
-        At frequencies in place of those that are not known yet, with the fills that come with them.
+        At settings in place of those that are not known yet, with the fills that come with them.
     prices : Prices
     cores : int
     """
-    if not later:
-        return ""
     runs = [run for run in later if run.part != FILL]
     of_springs = sum(SPRINGS in run.part for run in runs)
     springs = f", {of_springs} of them with other springs" if of_springs else ""
-    work = sum(prices.work(run) for run in later)
-    unit = kind_of(runs[0].scenario).planning.work_unit
-    whole = duration_text(study_s([prices.piece(run) for run in later], cores))
-    return (
-        f"Then, once the optimum is known, its controls: about {len(runs)} runs{springs}, "
-        f"{work:.3g} {unit}. Wall time on {cores} cores: {whole}\n"
-    )
+    names = {name for r in runs if r.part == COARSER.part for name in (r.run, r.fill)}
+    coarser = [run for run in later if run.run in names]
+    controls = [run for run in later if run not in coarser]
+    said = ""
+    for sort, what in (
+        (controls, f", once the optimum is known, its controls: about {{}} runs{springs}"),
+        (
+            coarser,
+            f" the best setting and the next with grains {FACTOR:g} times as large: {{}} runs",
+        ),
+    ):
+        if sort:
+            work = sum(prices.work(run) for run in sort)
+            whole = duration_text(study_s([prices.piece(run) for run in sort], cores))
+            number_of = sum(run.part != FILL for run in sort)
+            said += (
+                f"Then{what.format(number_of)}, {work:.3g} "
+                f"{kind_of(sort[0].scenario).planning.work_unit}. Wall time on {cores} cores: "
+                f"{whole}\n"
+            )
+    return said
 
 
 def _fills_line(runs: Sequence[Run], fills: Sequence[Run]) -> str:

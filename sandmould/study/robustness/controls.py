@@ -9,6 +9,7 @@ from typing import Any
 import numpy as np
 
 from sandmould.definition.certificate import RobustnessChecks
+from sandmould.definition.grain_check import FACTOR
 from sandmould.engines.registry import engine_of
 from sandmould.scenario.box import Tube
 from sandmould.scenario.scenario import FULL_OVERLAP, Scenario
@@ -202,9 +203,11 @@ def _finer(factor: float) -> Change:
     return change
 
 
+COARSER = Case("grain_scale", f"x{FACTOR:g}", FACTOR, _coarser(FACTOR))
+"""Of a study's grain check."""
 BY_FACTOR: dict[str, tuple[tuple[float, ...], Callable[[float], Change]]] = {
     "bed_depth": ((0.5, 2.0), _deeper),
-    "grain_scale": ((0.75, 1.5), _coarser),
+    "grain_scale": ((0.75, FACTOR), _coarser),
     "tube_length": ((0.6, 1.5), _longer),
     "time_step": ((0.5,), _finer),
 }

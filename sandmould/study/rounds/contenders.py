@@ -80,6 +80,21 @@ def find_contenders(summary: pd.DataFrame, study: Study, keys: list[str]) -> Con
     return Contenders(verdict, points, tuple(planned[tuple(p.items())] for p in points))
 
 
+def best_points(summary: pd.DataFrame, study: Study, keys: list[str]) -> tuple[Point, ...]:
+    """The setting with the best mean and the next best, or what there is of them.
+
+    Parameters
+    ----------
+    summary, study, keys
+        As of ``find_contenders``.
+    """
+    verdict = compare_settings(summary, keys, study.objective.measure, study.objective.better)
+    if verdict.best is None:
+        return ()
+    ranked = [verdict.best.label, *(c.other for c in verdict.comparisons)]
+    return tuple(dict(verdict.setting(label).values) for label in ranked[:2])
+
+
 def why_decided(contenders: Contenders, half_width: float | None) -> str:
     """Say why no more replicates are due; empty where they are.
 

@@ -7,6 +7,7 @@ from dataclasses import replace
 import pandas as pd
 
 from sandmould.definition.certificate import round_best_hz
+from sandmould.definition.grain_check import FACTOR
 from sandmould.definition.refinement import Refinement
 from sandmould.definition.study import Study
 from sandmould.definition.sweep import is_whole, points
@@ -15,7 +16,7 @@ from sandmould.runs.formatting import listed, name_of, number, setting_text, uni
 from sandmould.statistics.emulator import TooFewRunsError
 from sandmould.statistics.optimum import Optimum, find_optimum
 from sandmould.statistics.propose import propose
-from sandmould.study.rounds.contenders import find_contenders, why_decided
+from sandmould.study.rounds.contenders import best_points, find_contenders, why_decided
 from sandmould.study.rounds.round_log import Round, RoundLog
 
 
@@ -31,13 +32,16 @@ def next_runs(log: RoundLog, study: Study, summary: pd.DataFrame, keys: list[str
     keys : list of str
         Swept keys.
     """
+    # Runs of the controls lie beyond the sweep: they must not open what has ended, or all
+    # controls are computed again round another optimum.
+    of_rounds = _of_rounds(log, study, summary, keys)
     if study.refine.rounds:
         of_kind = next_round if study.refine.adds == "points" else next_replicates
-        # Runs of the controls lie beyond the sweep: they must not open what has ended, or all
-        # controls are computed again round another optimum.
-        log = of_kind(log, study, _of_rounds(log, study, summary, keys), keys)
+        log = of_kind(log, study, of_rounds, keys)
     else:
         log = replace(log, ended="The sweep is done.")
+    if log.ended and study.grain_price_share:
+        log = replace(log, coarsened=best_points(of_rounds, study, keys))
     if not log.ended or not study.certificate.controls or log.certified_hz:
         return log
     try:
@@ -66,8 +70,12 @@ def next_round(log: RoundLog, study: Study, summary: pd.DataFrame, keys: list[st
         {key: optimum.interval(key) for key in keys},
         spent_h,
     )
-    # Controls are of the optimum that was best then: with more runs they are chosen anew.
-    return replace(log, rounds=(*log.rounds, added), ended="", certified_hz=())
+    return _with_round(log, added)
+
+
+def _with_round(log: RoundLog, added: Round) -> RoundLog:
+    """With one round more: what is computed round the best setting is chosen anew after it."""
+    return replace(log, rounds=(*log.rounds, added), ended="", certified_hz=(), coarsened=None)
 
 
 def _of_rounds(log: RoundLog, study: Study, summary: pd.DataFrame, keys: list[str]) -> pd.DataFrame:
@@ -112,7 +120,7 @@ def next_replicates(
     if ended:
         return replace(log, ended=ended)
     added = Round(runs, contenders.points[0], {}, spent_h)
-    return replace(log, rounds=(*log.rounds, added), ended="", certified_hz=())
+    return _with_round(log, added)
 
 
 def _spent_h(summary: pd.DataFrame) -> float:
@@ -169,6 +177,10 @@ def _intervals(optimum: Optimum, keys: list[str]) -> str:
 
 def decision_text(log: RoundLog, study: Study) -> str:
     """One line on the last decision, for the terminal."""
+    if log.ended and log.coarsened:
+        again = listed([setting_text(point) for point in log.coarsened])
+        coarser = f" With grains {FACTOR:g} times as large again{again and ': '}{again}."
+        return decision_text(replace(log, coarsened=None), study) + coarser
     if log.ended and log.certified_hz:
         frequencies = listed([number(f) for f in log.certified_hz])
         controls = listed([c.replace("_", " ") for c in study.certificate.controls], most=8)

@@ -44,6 +44,9 @@ class RoundLog:
     certified_hz: tuple[float, ...] = ()
     """Frequencies of the controls, the best in the middle; none before it is known."""
 
+    coarsened: tuple[Point, ...] | None = None
+    """Points for coarser grains, the best first; None before they are chosen."""
+
     @property
     def runs(self) -> list[tuple[Point, int]]:
         """Runs of all rounds."""
@@ -65,7 +68,7 @@ def read_rounds(folder: Path, study: Study) -> RoundLog:
         When the file was changed into something that is no list of rounds.
     """
     path, basis = folder / ROUNDS_FILE, basis_of(study)
-    if not (study.refine.rounds or study.certificate.controls) or not path.is_file():
+    if not study.decides_more or not path.is_file():
         return RoundLog(basis)
     try:
         log = log_of(path.read_bytes())

@@ -22,8 +22,8 @@ CASES: dict[str, tuple[str | bytes, str]] = {
     "unknown key named like a type": (
         "based_on: tube\nstrength: 1",
         "trial.yaml: strength = 1 cannot be used: valid is one of the keys based_on, calibration, "
-        "certificate, cross_check, equivalence, kind, material, objective, own_measures, refine, "
-        "replicates, scenario, sweep, table, title.",
+        "certificate, cross_check, equivalence, grain_check, kind, material, objective, "
+        "own_measures, refine, replicates, scenario, sweep, table, title.",
     ),
     "swept mesh that is not there": (
         "based_on: bracket\nsweep: {keys: {obstacles.0.file: [absent.stl]}}",

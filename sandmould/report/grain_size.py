@@ -1,0 +1,103 @@
+"""What the report says of the size of the model's grains, from runs with coarser ones."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import pandas as pd
+
+from sandmould.definition.grain_check import FACTOR
+from sandmould.definition.study import Study
+from sandmould.kinds.sand.narrow import narrow_spaces
+from sandmould.report.tables import Cell, Column, Table
+from sandmould.runs.columns import RUN, VIBRATION_TIME_S, during_vibration
+from sandmould.runs.formatting import display_number, display_range, name_of
+from sandmould.scenario.scenario import Scenario
+from sandmould.statistics.grain_change import GrainChange, grain_changes
+from sandmould.statistics.over_time import first_reach_s
+from sandmould.study.collect import Collected
+from sandmould.study.robustness.controls import COARSER
+from sandmould.wording.grain_size import grain_sentences
+
+FILLED = 0.9
+"""Share of its last fill at which a cavity counts as filled."""
+FILLED_S = "filled_to_nine_tenths_s"
+ALSO = (
+    "bed_solid_fraction", "loose_fraction", "loose_under_fraction", "largest_loose_zone_m3",
+    "pattern_largest_displacement_m",
+)  # fmt: skip
+"""Measures that the table has beside those that the study asks for."""
+
+
+@dataclass(frozen=True)
+class GrainSizePages:
+    """What the section shows."""
+
+    sentences: tuple[str, ...]
+    table: Table
+    factor = f"{FACTOR:g}"
+
+
+def grain_size_pages(
+    study: Study, collected: Collected, scenario: Scenario, best: str
+) -> GrainSizePages | None:
+    """Compare the runs with coarser grains with those of the sweep; None without such runs.
+
+    Parameters
+    ----------
+    study : Study
+    collected : Collected
+        Of all runs.
+    scenario : Scenario
+        Of the run that is shown.
+    best : str
+        Label of the best setting.
+    """
+    objective = study.objective
+    asked = (objective.measure, *(aim.measure for aim in objective.beside))
+    measures = [m for m in dict.fromkeys((*asked, *ALSO)) if m in collected.summary]
+    summary = _with_times(collected, objective.measure)
+    measures += [column for column in (FILLED_S,) if column in summary]
+    changes = list(grain_changes(summary, collected.keys, measures, COARSER.part))
+    of_objective = sorted(
+        (c for c in changes if c.measure == objective.measure), key=lambda c: c.label != best
+    )
+    if not of_objective or of_objective[0].label != best:
+        return None
+    narrow = [name for space in narrow_spaces(scenario) for name in space.names]
+    said = grain_sentences(of_objective, objective.better, narrow)
+    return GrainSizePages(said, _table(changes))
+
+
+def _with_times(collected: Collected, measure: str) -> pd.DataFrame:
+    """The summary with the time in which a cavity fills, where the measure is a fill."""
+    if not measure.endswith("_fill_fraction"):
+        return collected.summary
+    times_s = {
+        run: first_reach_s(rows[VIBRATION_TIME_S], rows[measure], FILLED * rows[measure].iloc[-1])
+        for run, rows in during_vibration(collected.curves).groupby(RUN)
+    }
+    return collected.summary.assign(**{FILLED_S: collected.summary[RUN].map(times_s)})
+
+
+def _table(changes: list[GrainChange]) -> Table:
+    columns = (
+        Column("setting", False),
+        Column("measure", False),
+        Column("grains of the study"),
+        Column(f"{FACTOR:g} times as large"),
+        Column("change, 95 %"),
+        Column(f"foretold {FACTOR:g} times finer, 90 %"),
+    )
+    rows = tuple(
+        (
+            Cell(each.label or "–", each.label),
+            Cell(name_of(each.measure), each.measure),
+            Cell(display_number(each.measure, mean := float(each.own.mean())), repr(mean)),
+            Cell(display_number(each.measure, mean + each.change), repr(mean + each.change)),
+            Cell(display_range(each.measure, *each.ci), repr(each.change)),
+            Cell(display_range(each.measure, *each.finer), repr(sum(each.finer) / 2)),
+        )
+        for each in changes
+    )
+    return Table(columns, rows, tuple(each.is_seen for each in changes))
