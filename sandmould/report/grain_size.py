@@ -6,7 +6,6 @@ from dataclasses import dataclass
 
 import pandas as pd
 
-from sandmould.definition.grain_check import FACTOR
 from sandmould.definition.study import Study
 from sandmould.kinds.sand.narrow import narrow_spaces
 from sandmould.report.tables import Cell, Column, Table
@@ -14,6 +13,7 @@ from sandmould.runs.columns import RUN, VIBRATION_TIME_S, during_vibration
 from sandmould.runs.formatting import display_number, display_range, name_of
 from sandmould.scenario.scenario import Scenario
 from sandmould.statistics.grain_change import GrainChange, grain_changes
+from sandmould.statistics.grain_check import FACTOR
 from sandmould.statistics.over_time import first_reach_s
 from sandmould.study.collect import Collected
 from sandmould.study.robustness.controls import COARSER

@@ -12,10 +12,10 @@ import pandas as pd
 import scipy
 from numpy.typing import NDArray
 
-from sandmould.definition.grain_check import FACTOR
 from sandmould.runs.columns import PART, SWEEP
 from sandmould.runs.formatting import setting_text
 from sandmould.statistics.evidence import usable_values
+from sandmould.statistics.grain_check import FACTOR
 from sandmould.statistics.mean_tests import CONFIDENCE
 from sandmould.statistics.settings import group_settings
 

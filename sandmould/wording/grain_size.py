@@ -4,9 +4,9 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
-from sandmould.definition.grain_check import FACTOR
 from sandmould.runs.templates import sentences
 from sandmould.statistics.grain_change import GrainChange, order_of
+from sandmould.statistics.grain_check import FACTOR
 
 
 def grain_sentences(

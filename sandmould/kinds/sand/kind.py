@@ -6,7 +6,6 @@ from typing import TYPE_CHECKING, Literal
 
 from pydantic import Field
 
-from sandmould.definition.grain_check import FEWEST, GrainCheck
 from sandmould.definition.study import Study, kind_key
 from sandmould.definition.table import VibratingTable
 from sandmould.kinds.kind import Kind, opened_later
@@ -16,6 +15,7 @@ from sandmould.scenario.quantity import Section
 from sandmould.scenario.sand import Sand
 from sandmould.scenario.scenario import Scenario
 from sandmould.scenario.vibration import VibrationStage
+from sandmould.statistics.grain_check import FEWEST, GrainCheck
 
 if TYPE_CHECKING:
     from sandmould.statistics.answer import SweepEnd

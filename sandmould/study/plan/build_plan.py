@@ -22,8 +22,9 @@ from sandmould.kinds.kind import AnyScenario, Kind, Planning, SpeedClass
 from sandmould.kinds.registry import kind_named
 from sandmould.runs.words import say
 from sandmould.study.plan.batches import Batch, mark_done, plan_batches
-from sandmould.study.plan.expand import coarser_runs, expand, swept_key
+from sandmould.study.plan.expand import expand, swept_key
 from sandmould.study.plan.fills import planned_work, share_fills
+from sandmould.study.plan.grain_check import affordable_runs
 from sandmould.study.plan.lacking import Lack, Need, lacks, note_lacks
 from sandmould.study.plan.later_key import at_later_key
 from sandmould.study.plan.load_study import OpenStudy, StudyFile, study_files, study_of
@@ -228,7 +229,7 @@ def open_plan(path: Path, results: Path = RESULTS, text: str | None = None) -> P
 def planned_runs(study: OpenStudy, log: RoundLog) -> list[Run]:
     """Runs of a study with those of its rounds and of what they have decided."""
     runs = expand(study, log.runs, log.certified_hz)
-    return [*runs, *coarser_runs(study, log.coarsened or (), runs)] if log.coarsened else runs
+    return [*runs, *affordable_runs(study, log.coarsened or (), runs)] if log.coarsened else runs
 
 
 def _misfits(files: Sequence[StudyFile]) -> set[str]:
@@ -252,7 +253,7 @@ def _sound_runs(study: OpenStudy, results: Path) -> tuple[list[Run], list[Run]]:
     trial = expand(study, (), trial_hz) if trial_hz else []
     if study.study.grain_price_share and log.coarsened is None:
         first = points(study.study.sweep, study.study.scenario)
-        trial += coarser_runs(study, first, runs)
+        trial += affordable_runs(study, first, runs)
     planning = kind_named(study.study.kind).planning
     for run in (*runs, *trial):
         problem = planning.engine_problem(run.scenario)

@@ -11,10 +11,9 @@ import numpy as np
 from sandmould.bad_input import BadInputError, Problem
 from sandmould.definition.certificate import SEEDS, frequency_key, spanned_hz
 from sandmould.definition.comparing import ENGINE
-from sandmould.definition.grain_check import FEWEST
 from sandmould.definition.run import Part, Run
 from sandmould.definition.sweep import Point, points, value_at
-from sandmould.kinds.kind import AnyScenario, Planning
+from sandmould.kinds.kind import AnyScenario
 from sandmould.kinds.registry import kind_named
 from sandmould.runs.columns import CROSS_CHECK, CROSS_CHECK_OWN
 from sandmould.runs.formatting import setting_text
@@ -22,7 +21,6 @@ from sandmould.runs.hashing import by_name, scenario_hash
 from sandmould.scenario.quantity import Section
 from sandmould.scenario.reading import Origin, Tree, merge, validated
 from sandmould.scenario.scenario import Scenario
-from sandmould.study.plan.fills import own_work, share_fills
 from sandmould.study.plan.labels import Labels, letters
 from sandmould.study.plan.load_study import ROOT_KEY, OpenStudy
 from sandmould.study.plan.measured import problems as measure_problems
@@ -129,50 +127,22 @@ def expand(
     return list(runs.values())
 
 
-def coarser_runs(study: OpenStudy, best: Sequence[Point], planned: Sequence[Run]) -> list[Run]:
-    """Runs with coarser grains at the best setting and the next, as many as the price allows.
+def coarser_runs(study: OpenStudy, point: Point, replicates: Iterable[int]) -> list[Run]:
+    """Runs of a point with coarser grains; none where no engine can compute them.
 
     Parameters
     ----------
     study : OpenStudy
-    best : sequence of Point
-        The best first.
-    planned : sequence of Run
-        Of the sweep and its rounds.
-
-    Returns
-    -------
-    list of Run
-        Both settings with equally many replicates, or the best alone, or none: fewer than
-        ``FEWEST`` tell nothing.
+    point : Point
+    replicates : iterable of int
     """
     base = study.study.scenario.model_dump(mode="json")
     kind = kind_named(study.study.kind)
-    labels = Labels(kind.scenario, kind.labels_have_units)
-    allowed = study.study.grain_price_share * _work(planned, kind.planning)
-    of_points: list[list[Run]] = []
-    for point in best[:2]:
-        at_point = _AtPoint(study, base, point, labels)
-        if at_point.scenario is None or at_point.problems:
-            break
-        scenario, wrong = at_point.changed(COARSER)
-        if wrong:
-            break
-        point = at_point.point
-        of_point = [r.replicate for r in planned if r.part == "sweep" and r.parameters == point]
-        of_points.append(list(at_point.control(COARSER, scenario, sorted(set(of_point)))))
-    for chosen in (of_points, of_points[:1]):
-        for each in range(min(map(len, chosen), default=0), FEWEST - 1, -1):
-            runs = [run for of_point in chosen for run in of_point[:each]]
-            if _work(runs, kind.planning) <= allowed:
-                return runs
-    return []
-
-
-def _work(runs: Sequence[Run], planning: Planning[Any]) -> float:
-    """Planned work of runs, with that of the fills that they share once."""
-    shared, fills = share_fills(runs, planning)
-    return sum(map(own_work, (*shared, *fills)))
+    at_point = _AtPoint(study, base, point, Labels(kind.scenario, kind.labels_have_units))
+    if at_point.scenario is None or at_point.problems:
+        return []
+    scenario, wrong = at_point.changed(COARSER)
+    return [] if wrong else list(at_point.control(COARSER, scenario, replicates))
 
 
 def _as_planned(point: Point, planned: Sequence[Point]) -> Point:

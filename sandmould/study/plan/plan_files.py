@@ -11,7 +11,6 @@ from typing import Any
 import yaml
 from pydantic import create_model
 
-from sandmould.definition.grain_check import FACTOR
 from sandmould.definition.run import FILL, Part, Run
 from sandmould.definition.study import Study
 from sandmould.definition.sweep import Point
@@ -24,6 +23,7 @@ from sandmould.runs.templates import Note
 from sandmould.scenario.quantity import Section
 from sandmould.scenario.reading import Origin, read_planned, validated
 from sandmould.statistics.control_case import SPRINGS
+from sandmould.statistics.grain_check import FACTOR
 from sandmould.study.plan.fills import planned_work
 from sandmould.study.plan.price import Prices, study_s
 from sandmould.study.robustness.controls import COARSER

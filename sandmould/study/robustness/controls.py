@@ -9,12 +9,12 @@ from typing import Any
 import numpy as np
 
 from sandmould.definition.certificate import RobustnessChecks
-from sandmould.definition.grain_check import FACTOR
 from sandmould.engines.registry import engine_of
 from sandmould.scenario.box import Tube
 from sandmould.scenario.scenario import FULL_OVERLAP, Scenario
 from sandmould.scenario.vibration import VibrationStage
 from sandmould.statistics.control_case import SPRINGS, ControlCase
+from sandmould.statistics.grain_check import FACTOR
 
 SPRING_FACTORS = (0.25, 4.0)
 """Of all springs: a wave speed and a resonance go as the root, by 2 either way."""

@@ -7,13 +7,13 @@ from dataclasses import replace
 import pandas as pd
 
 from sandmould.definition.certificate import round_best_hz
-from sandmould.definition.grain_check import FACTOR
 from sandmould.definition.refinement import Refinement
 from sandmould.definition.study import Study
 from sandmould.definition.sweep import is_whole, points
 from sandmould.runs.columns import CPU_S, REPLICATE, total_s
 from sandmould.runs.formatting import listed, name_of, number, setting_text, unit_of
 from sandmould.statistics.emulator import TooFewRunsError
+from sandmould.statistics.grain_check import FACTOR
 from sandmould.statistics.optimum import Optimum, find_optimum
 from sandmould.statistics.propose import propose
 from sandmould.study.rounds.contenders import best_points, find_contenders, why_decided

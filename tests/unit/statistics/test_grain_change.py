@@ -7,9 +7,9 @@ import pandas as pd
 import pytest
 import scipy
 
-from sandmould.definition.grain_check import FACTOR
 from sandmould.runs.outcome import Outcome
 from sandmould.statistics.grain_change import FORETOLD, GrainChange, grain_changes, order_of
+from sandmould.statistics.grain_check import FACTOR
 
 KEY, FILL, PART = "vibration.0.frequency_hz", "tube_fill_fraction", "control: grain_scale x1.5"
 

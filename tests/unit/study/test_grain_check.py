@@ -11,10 +11,10 @@ import pandas as pd
 import pytest
 import yaml
 
-from sandmould.definition.grain_check import FACTOR
 from sandmould.report.grain_size import FILLED_S, grain_size_pages
 from sandmould.runs.columns import PART
 from sandmould.scenario.sand import Sand
+from sandmould.statistics.grain_check import FACTOR
 from sandmould.study.collect import Collected
 from sandmould.study.plan.build_plan import Plan, open_plan
 from sandmould.study.plan.fills import own_work

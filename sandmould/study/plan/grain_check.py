@@ -1,0 +1,53 @@
+"""Runs with coarser grains, as many as the price allows."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import Any
+
+from sandmould.definition.run import Run
+from sandmould.definition.sweep import Point
+from sandmould.kinds.kind import Planning
+from sandmould.kinds.registry import kind_named
+from sandmould.runs.columns import SWEEP
+from sandmould.statistics.grain_check import FEWEST
+from sandmould.study.plan.expand import coarser_runs
+from sandmould.study.plan.fills import own_work, share_fills
+from sandmould.study.plan.load_study import OpenStudy
+
+
+def affordable_runs(study: OpenStudy, best: Sequence[Point], planned: Sequence[Run]) -> list[Run]:
+    """Runs with coarser grains at the best setting and the next.
+
+    Parameters
+    ----------
+    study : OpenStudy
+    best : sequence of Point
+        The best first.
+    planned : sequence of Run
+        Of the sweep and its rounds.
+
+    Returns
+    -------
+    list of Run
+        Both settings with equally many replicates, or the best alone, or none: fewer than
+        ``FEWEST`` tell nothing.
+    """
+    planning = kind_named(study.study.kind).planning
+    allowed = study.study.grain_price_share * _work(planned, planning)
+    of_points = []
+    for point in best[:2]:
+        of_point = {r.replicate for r in planned if r.part == SWEEP and r.parameters == point}
+        of_points.append(coarser_runs(study, point, sorted(of_point)))
+    for chosen in (of_points, of_points[:1]):
+        for each in range(min(map(len, chosen), default=0), FEWEST - 1, -1):
+            runs = [run for of_point in chosen for run in of_point[:each]]
+            if _work(runs, planning) <= allowed:
+                return runs
+    return []
+
+
+def _work(runs: Sequence[Run], planning: Planning[Any]) -> float:
+    """Planned work of runs, with that of the fills that they share once."""
+    shared, fills = share_fills(runs, planning)
+    return sum(map(own_work, (*shared, *fills)))
