@@ -28,6 +28,7 @@ from sandmould.execution.settled import is_settled, note_settled
 from sandmould.execution.spent import note_spent
 from sandmould.execution.stopping import Stopped, run_in_group, until_stopped
 from sandmould.study.plan.build_plan import RESULTS, Plan, checked_plan, starts_jobs, writing
+from sandmould.study.plan.grain_check import coarser_text
 from sandmould.study.plan.plan_files import SUMMARY
 
 
@@ -83,8 +84,11 @@ def _compute(plan: Plan, options: Sequence[str], opening: str) -> int:
         from sandmould.study.next_round import decide_next  # statistics: slow to import
 
         log, decision = decide_next(study, folder)
-        print(f"\n{decision}", file=sys.stderr, flush=True)
         plan = checked_plan(path)
+        more = study.refine.rounds or study.certificate.controls
+        told = " ".join(filter(None, (decision if more else "", coarser_text(plan.runs))))
+        if told:
+            print(f"\n{told}", file=sys.stderr, flush=True)
         if log.ended:
             break
     status = _snakemake(plan, options, [])

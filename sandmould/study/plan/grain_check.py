@@ -10,10 +10,12 @@ from sandmould.definition.sweep import Point
 from sandmould.kinds.kind import Planning
 from sandmould.kinds.registry import kind_named
 from sandmould.runs.columns import SWEEP
-from sandmould.statistics.grain_check import FEWEST
+from sandmould.runs.formatting import listed, setting_text
+from sandmould.statistics.grain_check import FACTOR, FEWEST
 from sandmould.study.plan.expand import coarser_runs
 from sandmould.study.plan.fills import own_work, share_fills
 from sandmould.study.plan.load_study import OpenStudy
+from sandmould.study.robustness.controls import COARSER
 
 
 def affordable_runs(study: OpenStudy, best: Sequence[Point], planned: Sequence[Run]) -> list[Run]:
@@ -45,6 +47,15 @@ def affordable_runs(study: OpenStudy, best: Sequence[Point], planned: Sequence[R
             if _work(runs, planning) <= allowed:
                 return runs
     return []
+
+
+def coarser_text(runs: Sequence[Run]) -> str:
+    """Which settings are computed again with coarser grains, as a line; empty where none is."""
+    added = [run for run in runs if run.part == COARSER.part]
+    settings = dict.fromkeys(setting_text(run.parameters) for run in added)
+    again = listed([setting for setting in settings if setting])
+    said = f"Again with grains {FACTOR:g} times as large{again and ': '}{again}."
+    return said if added else ""
 
 
 def _work(runs: Sequence[Run], planning: Planning[Any]) -> float:

@@ -13,7 +13,6 @@ from sandmould.definition.sweep import is_whole, points
 from sandmould.runs.columns import CPU_S, REPLICATE, total_s
 from sandmould.runs.formatting import listed, name_of, number, setting_text, unit_of
 from sandmould.statistics.emulator import TooFewRunsError
-from sandmould.statistics.grain_check import FACTOR
 from sandmould.statistics.optimum import Optimum, find_optimum
 from sandmould.statistics.propose import propose
 from sandmould.study.rounds.contenders import best_points, find_contenders, why_decided
@@ -177,10 +176,6 @@ def _intervals(optimum: Optimum, keys: list[str]) -> str:
 
 def decision_text(log: RoundLog, study: Study) -> str:
     """One line on the last decision, for the terminal."""
-    if log.ended and log.coarsened:
-        again = listed([setting_text(point) for point in log.coarsened])
-        coarser = f" With grains {FACTOR:g} times as large again{again and ': '}{again}."
-        return decision_text(replace(log, coarsened=None), study) + coarser
     if log.ended and log.certified_hz:
         frequencies = listed([number(f) for f in log.certified_hz])
         controls = listed([c.replace("_", " ") for c in study.certificate.controls], most=8)

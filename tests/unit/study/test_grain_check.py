@@ -18,10 +18,11 @@ from sandmould.statistics.grain_check import FACTOR
 from sandmould.study.collect import Collected
 from sandmould.study.plan.build_plan import Plan, open_plan
 from sandmould.study.plan.fills import own_work
+from sandmould.study.plan.grain_check import coarser_text
 from sandmould.study.plan.plan_files import later_lines
 from sandmould.study.plan.price import Prices
 from sandmould.study.robustness.controls import COARSER
-from sandmould.study.rounds.decide import decision_text, next_runs
+from sandmould.study.rounds.decide import next_runs
 from sandmould.study.rounds.round_log import RoundLog, basis_of, read_rounds, write_rounds
 
 KEY, FILL = "vibration.0.frequency_hz", "tube_fill_fraction"
@@ -106,10 +107,9 @@ def test_the_best_and_the_next_are_computed_with_as_much_sand(tmp_path: Path) ->
     study = plan.study.study
     log = next_runs(RoundLog(basis_of(study)), study, summary_of(plan), [KEY])
     assert log.coarsened == BEST
-    assert decision_text(log, study) == (
-        "The sweep is done. With grains 1.5 times as large again: 50 Hz and 100 Hz."
-    )
     chosen = planned(tmp_path, log)
+    assert coarser_text(plan.runs) == ""
+    assert coarser_text(chosen.runs) == "Again with grains 1.5 times as large: 50 Hz and 100 Hz."
     added = [run for run in chosen.runs if run.part == COARSER.part]
     assert [(run.parameters, run.replicate) for run in added] == [
         (point, n) for point in BEST for n in (1, 2, 3)
@@ -117,7 +117,7 @@ def test_the_best_and_the_next_are_computed_with_as_much_sand(tmp_path: Path) ->
     assert {run.scenario.sand.size_scale for run in added} == {8 * FACTOR}
     assert not chosen.later
     # Its runs change neither the choice nor the log.
-    again = next_runs(log, study, summary_of(chosen)[lambda s: s[PART] == "sweep"], [KEY])
+    again = next_runs(log, study, summary_of(chosen).query("part == 'sweep'"), [KEY])
     assert again == log
 
 
