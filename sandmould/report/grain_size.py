@@ -33,6 +33,8 @@ ALSO = (
 class GrainSizePages:
     """What the section shows."""
 
+    short: tuple[str, ...]
+    """For the first screen."""
     sentences: tuple[str, ...]
     table: Table
     factor = f"{FACTOR:g}"
@@ -65,8 +67,11 @@ def grain_size_pages(
     if not of_objective or of_objective[0].label != best:
         return None
     narrow = [name for space in narrow_spaces(scenario) for name in space.names]
-    said = grain_sentences(of_objective, objective.better, narrow)
-    return GrainSizePages(said, _table(changes))
+    short, said = (
+        grain_sentences(of_objective, objective.better, narrow, is_short)
+        for is_short in (True, False)
+    )
+    return GrainSizePages(short, said, _table(changes))
 
 
 def _with_times(collected: Collected, measure: str) -> pd.DataFrame:

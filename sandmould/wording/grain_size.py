@@ -10,7 +10,7 @@ from sandmould.statistics.grain_check import FACTOR
 
 
 def grain_sentences(
-    changes: Sequence[GrainChange], better: str, narrow: Sequence[str]
+    changes: Sequence[GrainChange], better: str, narrow: Sequence[str], is_short: bool
 ) -> tuple[str, ...]:
     """Say what coarser grains change, what finer ones should give, and what is not known.
 
@@ -21,10 +21,13 @@ def grain_sentences(
     better : str
     narrow : sequence of str
         Tubes and cavities that fewer than five of the largest grains fit across.
+    is_short : bool
+        Whether the change is told of the best setting alone.
     """
     return sentences(
         "grain_size.j2",
         changes=changes,
+        shown=changes[:1] if is_short else changes,
         factor=f"{FACTOR:g}",
         two=len(changes) > 1,
         order=order_of(changes[0], changes[1], better) if len(changes) > 1 else "",

@@ -79,7 +79,7 @@ def _pages(findings: Findings[Scenario], film_budget_bytes: int) -> KindPages:
         _first_picture(pages, verdict, of_sweep),
         pages["beside"],
         grounds=sand_grounds(
-            scenario, study, verdict, findings.scenarios, grain_size.sentences if grain_size else ()
+            scenario, study, verdict, findings.scenarios, grain_size.short if grain_size else ()
         ),
         warning=_softness(scenario, of_sweep.summary),
     )
