@@ -56,6 +56,7 @@ def notes(scenario: Scenario) -> tuple[Note, ...]:
         walls={name: wall for name, wall in walls.items() if wall},
         smallest_m=smallest_m,
         drawings=drawn,
+        edges=scenario.engine.name == "liggghts" and bool(scenario.scene.meshes),
         **_of_pattern(scenario),
     )
 
