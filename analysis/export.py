@@ -28,7 +28,6 @@ def to_vtk(snapshot: Snapshot, path: Path) -> None:
 
     Parameters
     ----------
-    snapshot : Snapshot
     path : Path
         Appears only when complete.
     """
@@ -58,7 +57,6 @@ def solids_to_vtk(scene: Scene, path: Path) -> None:
 
     Parameters
     ----------
-    scene : Scene
     path : Path
         Appears only when complete.
     """
@@ -131,7 +129,6 @@ def to_ovito(snapshot: Snapshot, path: Path) -> None:
 
     Parameters
     ----------
-    snapshot : Snapshot
     path : Path
         Appears only when complete.
     """

@@ -51,8 +51,6 @@ def draw_frame(
     ----------
     fields : mapping
         Arrays of ``fields.npz``.
-    frame : Frame
-    axes : Axes
     highest_pa : float, Pa
         Upper end of the colours; their lower end is 0.
 

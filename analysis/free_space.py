@@ -100,7 +100,6 @@ def part_in_solid(
     ----------
     position_m : (n, d) float64, m
     radius_m : (n,) float64, m
-    solid : Solid
     walls : tuple of Wall, optional
         What of a 2D solid or an upright block lies behind them does not count.
 
@@ -167,7 +166,6 @@ def box_section(scene: Scene, low_m: float = 0.0, high_m: float = 0.0) -> Array:
 
     Parameters
     ----------
-    scene : Scene
     low_m, high_m : float, m
         Heights that bound the polygon in 2D; not used in 3D.
 

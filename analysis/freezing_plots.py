@@ -29,10 +29,6 @@ def draw_freezing(
 
     Parameters
     ----------
-    fields : mapping
-        Arrays of ``fields.npz``.
-    freezing : Freezing
-    axes : Axes
     distance_m : callable, optional
         From the surface of what is cast, whose outline is then drawn.
     """
@@ -92,9 +88,6 @@ def draw_part(low_m: Array, high_m: Array, at_m: float, axes: Axes, distance_m: 
         Corners of the box.
     at_m : float, m
         In 3D, y of the plane of x and z.
-    axes : Axes
-    distance_m : callable
-        As in :func:`draw_freezing`.
     """
     axis = 1 if len(low_m) == 3 else 2
     kept = [each for each in range(len(low_m)) if each != axis]

@@ -28,7 +28,6 @@ def sphere_mesh_m3(centre_m: Array, radius_m: Array, mesh: TriangleMesh) -> Arra
     ----------
     centre_m : (n, 3) float64, m
     radius_m : (n,) float64, m
-    mesh : TriangleMesh
 
     Returns
     -------
@@ -109,7 +108,6 @@ def mesh_below_m3(mesh: TriangleMesh, height_m: Array) -> Array:
 
     Parameters
     ----------
-    mesh : TriangleMesh
     height_m : (m,) float64, m
 
     Returns

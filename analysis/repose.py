@@ -77,8 +77,6 @@ def lying(position_m: Array, radius_m: Array, floor_m: float) -> NDArray[np.bool
     ----------
     position_m : (n, d) float64, m
     radius_m : (n,) float64, m
-    floor_m : float, m
-        Height of the floor.
 
     Returns
     -------
@@ -148,7 +146,6 @@ def profiles(surface: Surface, width_m: float, axis_m: Array) -> dict[str, tuple
 
     Parameters
     ----------
-    surface : Surface
     width_m : float, m
         Of the columns or rings that the surface is averaged over: about one of the largest grains.
     axis_m : (d - 1,) float64, m
@@ -188,11 +185,9 @@ def fit_flank(name: str, distance_m: Array, height_m: Array, foot: float = FOOT)
 
     Parameters
     ----------
-    name : str
     distance_m, height_m : (k,) float64, m
         Profile from foot to crest; only heights between ``foot`` and ``CREST`` of its largest,
         from the last point below that range on, are fitted.
-    foot : float
     """
     crest_m = float(height_m.max(initial=0.0))
     top = int(np.argmax(height_m >= CREST * crest_m)) if len(height_m) else 0
@@ -233,9 +228,6 @@ def heap_slope(surface: Surface, width_m: float, axis_m: Array) -> Slope:
 
     Parameters
     ----------
-    surface : Surface
-    width_m : float, m
-        As in ``profiles``.
     axis_m : (d - 1,) float64, m
         Where the sand fell; in 2D the crest beside it is looked for.
     """
@@ -259,7 +251,6 @@ def walls_touched(surface: Surface, low_m: Array, high_m: Array, depth_m: float)
 
     Parameters
     ----------
-    surface : Surface
     low_m, high_m : (d - 1,) float64, m
         Where the walls are.
     depth_m : float, m

@@ -74,8 +74,6 @@ def mean_solid_fraction(
     ----------
     position_m : (n, d) float64, m
     radius_m : (n,) float64, m
-    scene : Scene
-    low_m, high_m : float, m
 
     Raises
     ------

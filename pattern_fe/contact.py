@@ -55,12 +55,10 @@ def touch(
 
     Parameters
     ----------
-    surroundings : Surroundings
     at_m : (nv, d) float64, m
         Displacement from which the motion leads; gaps are linearised there.
     free_m : (nv, d) float64, m
         Displacement that it leads to without reactions.
-    response : Response
     pressed : (nv,) bool, optional
         Vertices with reactions before, whose closed gaps are taken to stay closed unless they are
         found to pull: a pattern that only its contacts keep from buckling has no stiffness without.

@@ -20,7 +20,6 @@ def vertex_pressure_pa(perimeter: Perimeter, load_n: Array) -> Array:
 
     Parameters
     ----------
-    perimeter : Perimeter
     load_n : (nv, d) float64, N
 
     Returns

@@ -35,7 +35,6 @@ class Limit:
         ----------
         key : str
             Key that asks for so many.
-        count : float
         value : any, optional
             What stands there; the count unless given.
         """

@@ -37,11 +37,8 @@ class FoamBody:
 
         Parameters
         ----------
-        pattern : Pattern
         large : bool
             Whether displacements are large.
-        surroundings : Surroundings, optional
-            What it can touch; nothing unless given.
         """
         self._pattern = pattern
         self._large = large

@@ -25,7 +25,6 @@ class PatternRest:
 
         Parameters
         ----------
-        sand : SandSession
         load_tolerance : float or None
             ``rest.load_tolerance``; None holds no stage.
         """

@@ -20,10 +20,8 @@ class ShapesFile:
 
         Parameters
         ----------
-        path : Path
         rows : int
             That a checkpoint vouches for; 0 begins anew.
-        vertices, dimension : int
         """
         self.rows = rows
         path.touch()

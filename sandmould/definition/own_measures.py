@@ -155,7 +155,6 @@ def problems_in_scene(own: Mapping[str, str], has: Collection[str]) -> Iterator[
 
     Parameters
     ----------
-    own : mapping of str to str
     has : collection of str
         Measures of the scene that are numbers.
     """
@@ -178,8 +177,6 @@ def with_own_measures(table: pd.DataFrame, own: Mapping[str, str]) -> pd.DataFra
 
     Parameters
     ----------
-    table : DataFrame
-        One row a snapshot.
     own : mapping of str to str
         Formulas that have no problems.
 

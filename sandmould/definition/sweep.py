@@ -143,7 +143,6 @@ def points(sweep: Sweep, scenario: Any) -> list[Point]:
 
     Parameters
     ----------
-    sweep : Sweep
     scenario : scenario of any kind
         What is varied: its type says which keys take whole numbers only, its seed fixes the
         points of a drawn design.

@@ -220,7 +220,6 @@ def whole_step(contacts: ActiveContacts, of_step_s: float | None = None) -> Stab
 
     Parameters
     ----------
-    contacts : ActiveContacts
     of_step_s : float, s, optional
         Step that dashpots are corrected for; by default the limit itself.
     """

@@ -69,8 +69,6 @@ class Solver:
 
         Parameters
         ----------
-        scene : DemScene
-        surfaces : Surfaces
         skin_m : float
             Pairs nearer than this are listed; the list serves until a grain has gone half of it.
         threads : int

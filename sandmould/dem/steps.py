@@ -244,8 +244,6 @@ def find_forces(dim: tuple[float, ...], scene: DemScene, moving: Moving) -> None
     ----------
     dim : tuple
         ``PLANE`` or ``SPACE``, which is also the shift, speed and body force: none.
-    scene : DemScene
-    moving : Moving
     """
     for c in range(len(moving.bound) - 1):
         step_chunk(dim, c, scene, moving, moving.grains, moving.ahead, dim, dim, dim, 0.0, False)
@@ -336,17 +334,13 @@ def advance(
     ----------
     dim : tuple
         ``PLANE`` or ``SPACE``.
-    steps : int
     drifted : bool
         Whether the first step has already moved the grains and waited for new lists.
-    scene : DemScene
-    moving : Moving
     displacement : (steps + 2,) float64, m
         Of the box along its direction, from one step before the first.
     half_skin : float, m
     thread, threads : int
         Which of how many threads calls; each computes chunks of its own, and all return alike.
-    team : Team
 
     Returns
     -------

@@ -45,7 +45,6 @@ def tints(n: int, ordered: bool) -> tuple[Tint, ...]:
 
     Parameters
     ----------
-    n : int
     ordered : bool
         Whether the settings have an order, which a run from dark to bright then shows.
     """
@@ -218,7 +217,6 @@ def lay_out(chart: Chart, size: tuple[int, int]) -> Laid:
 
     Parameters
     ----------
-    chart : Chart
     size : (int, int), px
         Width and height; rows of settings make the drawing as high as they need.
     """

@@ -35,7 +35,6 @@ def convergence_charts(log: pd.DataFrame, begins_s: float) -> tuple[ConvergenceC
 
     Parameters
     ----------
-    log : DataFrame
     begins_s : float, s
         When vibration begins: zero of the charts.
     """

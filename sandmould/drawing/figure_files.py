@@ -65,9 +65,6 @@ def write_figures(
 
     Parameters
     ----------
-    folder : Path
-    environment : Environment
-        Of the report's templates.
     files : mapping of str to Chart or bytes
         By name without its ending.
     """

@@ -75,7 +75,6 @@ def draw_dimensions(scenario: Scenario, bed_height_m: float | None) -> str:
 
     Parameters
     ----------
-    scenario : Scenario
     bed_height_m : float, m, optional
         Height of the filled bed, shown as a line.
 
@@ -103,7 +102,6 @@ def dimensioned(
 
     Parameters
     ----------
-    scenario : Scenario
     bed_height_m : float, m, optional
         Height of the filled bed, shown as a line where there are no grains.
     grains : Snapshot, optional
@@ -211,13 +209,6 @@ def draw_layers(
 ) -> tuple[str, ...]:
     """Draw each snapshot with its grains in the colour of their layer of fill.
 
-    Parameters
-    ----------
-    snapshots : sequence of Snapshot
-    scenario : Scenario
-    height_m : float, m
-        Up to which the box is shown.
-
     Returns
     -------
     tuple of str
@@ -238,13 +229,6 @@ def draw_densities(
     snapshots: Sequence[Snapshot], scenario: Scenario, height_m: float
 ) -> tuple[tuple[str, ...], DensityScale, tuple[float, ...]]:
     """Draw each snapshot with its grains coloured by apparent density, on one scale.
-
-    Parameters
-    ----------
-    snapshots : sequence of Snapshot
-    scenario : Scenario
-    height_m : float, m
-        Up to which the box is shown.
 
     Returns
     -------

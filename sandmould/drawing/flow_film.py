@@ -58,13 +58,8 @@ def make_flow_film(
 
     Parameters
     ----------
-    fields : mapping
-        Arrays of ``fields.npz``.
-    run, label : str
     highest_pa : float, Pa
         Full shade of the pressure.
-    budget_bytes : int
-        Most that ``data`` may weigh.
     """
     total = len(fields["time_s"])
     return within_budget(

@@ -34,11 +34,6 @@ def draw_loose_field(
     zones : sequence of int
         Those that are outlined, as seen along y, and numbered from 1: in full where the plane cuts
         them, else dashed.
-    last : Snapshot
-        What it is of.
-    scenario : Scenario
-    height_m : float, m
-        Up to which the box is shown.
 
     Returns
     -------

@@ -72,8 +72,6 @@ def sphere_scene(
     ----------
     scenario : Scenario
         In three dimensions.
-    top_m : float, m
-        Height up to which the box is shown.
     fields : sequence of SurfaceField, optional
         By which the solids can be coloured.
     """
@@ -104,8 +102,6 @@ def solid_scene(
         Blocks and meshes.
     low_m, high_m : (3,) float64, m
         Corners of the box, which need not be at the origin.
-    fields : sequence of SurfaceField, optional
-        As in :func:`sphere_scene`.
     """
     moved = [replace(field, place_m=field.place_m - low_m) for field in fields]
     packed = []

@@ -68,8 +68,6 @@ def render_parts(
 
     Parameters
     ----------
-    dialect : str
-    program : Program
     context_of : callable
         Names and values for the templates, of a program.
     """

@@ -37,9 +37,6 @@ def deck_context(program: Program, lines: Lines, run: str, study: str) -> dict[s
 
     Parameters
     ----------
-    program : Program
-    lines : Lines
-        Of the program's scenario.
     run, study : str
         Names for the deck's first line.
     """

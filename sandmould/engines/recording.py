@@ -27,8 +27,6 @@ class Recorder:
 
         Parameters
         ----------
-        work : Path
-        dimension : int
         mark : CheckpointMark, optional
             The checkpoint that the run continues from.
         """

@@ -59,7 +59,6 @@ def engine_stop(engine: str, message: str, of_user: bool = False) -> EngineStop:
 
     Parameters
     ----------
-    engine, message : str
     of_user : bool
         Whether the deck is the user's own, in which a style can be misspelt.
     """

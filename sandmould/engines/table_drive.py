@@ -71,7 +71,6 @@ def table_motion(program: Program, stage: Stage) -> TableMotion | None:
 
     Parameters
     ----------
-    program : Program
     stage : Stage
         Any stage, of the program or not.
     """

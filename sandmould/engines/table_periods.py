@@ -67,11 +67,8 @@ def window_of(
 
     Parameters
     ----------
-    table : MountedTable
-    drive : TableDrive
     places_m : (steps + 2,) float64, m
     times_s : (steps,) float64, s
-    step_s : float
     """
     before, now, after = places_m[:-2], places_m[1:-1], places_m[2:]
     way, speed = 0.5 * (after - before), 0.5 * (after - before) / step_s
@@ -106,13 +103,10 @@ class TablePeriods:
 
         Parameters
         ----------
-        stage : str
-        frequency_hz : float
         periods : int
             Of the stage; steps after the last one are left out.
         offset_s : float
             Time of vibration when the stage began.
-        window : Window
 
         Returns
         -------

@@ -11,11 +11,6 @@ from sandmould.study.collect import read_summary
 def failed_runs(study_folder: Path) -> None:
     """Fail loudly when a run of the study failed.
 
-    Parameters
-    ----------
-    study_folder : Path
-        With the tables that ``collect`` wrote.
-
     Raises
     ------
     SystemExit

@@ -72,8 +72,6 @@ def do(work: Callable[..., int | None], *given: Any, log: Path, name: str = "") 
     ----------
     work : callable
         A function of a module; gives the exit status, None for 0.
-    *given
-        What it takes.
     log : Path
         Takes all that it prints, which also goes to standard error.
     name : str

@@ -100,8 +100,6 @@ def record(path: Path, results: Path, figures: Sequence[str] = ()) -> Path:
 
     Parameters
     ----------
-    path, results : Path
-        Of the study, and where its results lie.
     figures : sequence of str
         Names of figures that a page shall show. Those that the record has are kept, too, as they
         are drawn now.
@@ -169,7 +167,6 @@ def over_time(curves: pd.DataFrame, measure: str) -> pd.DataFrame:
     ----------
     curves : DataFrame
         One row a snapshot.
-    measure : str
 
     Returns
     -------

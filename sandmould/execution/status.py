@@ -124,12 +124,8 @@ def run_statuses(
 
     Parameters
     ----------
-    plan : Plan
-    results : Path
     lacks : mapping of str to Lack
         See ``Plan.lacks``.
-    live : collection of str, optional
-        As of ``run_status``.
     """
     folder = results / plan.study.name
     fills = [
@@ -148,10 +144,6 @@ def status_text(plan: Plan, results: Path, cores: int, deep: bool = False) -> st
 
     Parameters
     ----------
-    plan : Plan
-    results : Path
-    cores : int
-        That share what is left.
     deep : bool
         Whether all files of runs that are done or failed are compared with their hashes.
     """

@@ -97,7 +97,6 @@ def run_in_group(
         What the process does that is forked from this one; ends by ``SystemExit``.
     log : file, optional
         Takes all that it and its jobs print; the terminal unless given.
-    environment : mapping of str to str, optional
     look : callable, optional
         Called while it runs; gives the seconds until the next call.
     asked_first : bool

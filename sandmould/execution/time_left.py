@@ -17,8 +17,6 @@ class TimeLeft:
 
         Parameters
         ----------
-        runs : iterable of Run
-            All of the study.
         rate_per_s : mapping of SpeedClass to float
             Work a second of one core, as measured on this machine.
         """
@@ -56,10 +54,6 @@ class TimeLeft:
         ----------
         running : mapping of str to float
             Runs that are being computed, or stopped on the way, with the share that is done.
-        waiting : collection of str
-            Runs that have not begun.
-        cores : int
-            That share them.
         """
         pieces = [self._rest(run, share) for run, share in running.items()]
         pieces += [self.prices.piece(self._runs[run]) for run in waiting]

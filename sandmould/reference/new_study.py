@@ -58,9 +58,6 @@ def write_new_study(name: str, path: Path, given: dict[str, Any]) -> Plan:
 
     Parameters
     ----------
-    name : str
-        Of its template.
-    path : Path
     given : dict
         Options of ``sandmould new``, without those that were not given.
 

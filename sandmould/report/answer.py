@@ -68,12 +68,8 @@ def optimum_headline(
 
     Parameters
     ----------
-    pages : OptimumPages
     robustness : RobustnessPages, optional
         Its controls.
-    answer : Answer
-    summary : DataFrame
-        One row a run of the sweep.
     has_speed : bool
         Whether the study gives the wave speed of the real sand.
     """
@@ -122,14 +118,7 @@ def _as_drive(drive: Mapping[str, float] | None) -> BoxDrive | None:
 
 
 def figures_of(answer: Answer, summary: pd.DataFrame) -> tuple[KeyNumber, ...]:
-    """The one setting that suits the question in words of the machine; nothing where several do.
-
-    Parameters
-    ----------
-    answer : Answer
-    summary : DataFrame
-        One row a run of the sweep.
-    """
+    """The one setting that suits the question in words of the machine; nothing where several do."""
     if len(answer.wanted) != 1 or answer.beside:
         return ()
     return _figures(answer.verdict.setting(answer.wanted[0]), answer, summary)
@@ -168,10 +157,6 @@ def optimum_choice(
 
     Parameters
     ----------
-    pages : OptimumPages
-    summary : DataFrame
-        One row a run of the sweep.
-    verdict : Verdict
     is_artefact : bool
         Whether its controls show it to be none of the sand's.
     """

@@ -56,15 +56,8 @@ def bending_pages(
 
     Parameters
     ----------
-    study_folder : Path
     href : str
         Address of that folder, seen from the report.
-    scenario : Scenario
-        Of the run that is shown.
-    collected : Collected
-    verdict : Verdict
-    pictured_run : str
-        Name of that run.
     """
     verdicts: dict[str, LoopVerdict] = {}
     for run in collected.summary[RUN]:
@@ -168,10 +161,6 @@ def paper_sentences(scenario: Scenario, collected: Collected, pictured_run: str)
 
     Parameters
     ----------
-    scenario : Scenario
-        Of the run that is shown.
-    collected : Collected
-        Of the sweep.
     pictured_run : str
         Whose setting is judged, by the mean over its fillings.
 

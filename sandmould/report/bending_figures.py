@@ -61,7 +61,6 @@ def coupling_map(collected: Collected, states: Mapping[str, State]) -> CouplingM
 
     Parameters
     ----------
-    collected : Collected
     states : mapping of run to state
         Of the runs that can be judged.
 
@@ -146,12 +145,6 @@ _STYLES = {"filled": ("after filling", "#D55E00"), "final": ("at the end", "#007
 
 def draw_outlines(run_folder: Path, scenario: Scenario) -> tuple[str, str]:
     """Draw the shapes of one run, in 3D cut through the middle; displacements are not magnified.
-
-    Parameters
-    ----------
-    run_folder : Path
-    scenario : Scenario
-        With a pattern among its obstacles.
 
     Returns
     -------

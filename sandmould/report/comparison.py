@@ -245,14 +245,8 @@ def write_comparison(comparison: SideBySide, out: Path) -> Path:
 
     Parameters
     ----------
-    comparison : SideBySide
     out : Path
         The HTML file; it opens offline.
-
-    Returns
-    -------
-    Path
-        The picture.
     """
     environment = page_environment()
     chart = comparison.chart()

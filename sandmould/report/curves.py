@@ -88,8 +88,6 @@ def time_chart(
     ----------
     curves, summary : DataFrame
         From :func:`sandmould.study.collect.collect`.
-    verdict : Verdict
-    keys : sequence of str
     measure : str
         A column of ``curves``.
 

@@ -26,8 +26,6 @@ def drive_of(scenario: Scenario, runs: pd.DataFrame) -> BoxDrive | None:
 
     Parameters
     ----------
-    scenario : Scenario
-        At the setting.
     runs : DataFrame
         Rows of the summary at the setting: a table on mounts moves as it was measured.
     """
@@ -50,8 +48,6 @@ def drive_at(
     ----------
     summary : DataFrame
         One row a run.
-    keys : sequence of str
-        Swept keys, all numbers.
     setting : mapping of str to float
         A value of each key.
 

@@ -45,10 +45,6 @@ def filling_pages(
 
     Parameters
     ----------
-    study : Study
-    collected : Collected
-        Of the sweep.
-    verdict : Verdict
     scenario : Scenario
         At the best setting.
     """

@@ -28,14 +28,8 @@ def loose_sand_pages(
 
     Parameters
     ----------
-    folder : Path
-        Of the study.
-    run : str
-        The one that is pictured.
     scenario : Scenario
         Its grains are the measure of a zone.
-    height_m : float, m
-        Up to which the box is shown.
     """
     if not run or not seeks_loose_sand(scenario):
         return None

@@ -59,8 +59,6 @@ def sand_method(scenario: Scenario, keys: Sequence[str], summary: pd.DataFrame) 
     ----------
     scenario : Scenario
         Of one run; what the study sweeps is said apart.
-    keys : sequence of str
-    summary : DataFrame
     """
     sand, contact = scenario.sand, scenario.laws
     hardness = bed_hardness(scenario)
@@ -109,7 +107,6 @@ def statistics_method(objective: Objective, ends: str, draws_by_lot: bool) -> Ro
 
     Parameters
     ----------
-    objective : Objective
     ends : str
         When measures are taken.
     draws_by_lot : bool

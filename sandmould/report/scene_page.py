@@ -52,7 +52,6 @@ def draw_scene_file(scenario: Scenario | Solidification, title: str, run: str, o
 
     Parameters
     ----------
-    scenario : Scenario or Solidification
     title, run : str
         What the page is headed with.
     out : Path

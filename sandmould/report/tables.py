@@ -105,7 +105,6 @@ def share_of_what_fits(
 
     Parameters
     ----------
-    summary : DataFrame
     measure : str
         The fill of that space.
     values : mapping of str to object, optional
@@ -172,7 +171,6 @@ def settings_table(verdict: Verdict, drives: Mapping[str, BoxDrive]) -> Table:
 
     Parameters
     ----------
-    verdict : Verdict
     drives : mapping of str to BoxDrive
         That of the vibrating table at a setting, by label.
     """
@@ -261,9 +259,6 @@ def runs_table(
 
     Parameters
     ----------
-    summary : DataFrame
-    keys : sequence of str
-    verdict : Verdict
     runs_href : str
         Address of the folder of runs, seen from the report.
 

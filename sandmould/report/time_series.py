@@ -19,8 +19,6 @@ def measure_curves(
 
     Parameters
     ----------
-    collected : Collected
-    verdict : Verdict
     measures : sequence of str
         Columns of the curves.
     """

@@ -27,7 +27,6 @@ class CheckpointFile:
 
         Parameters
         ----------
-        path : Path
         computed_hash : str
             Tells this run from one of another scenario or solver.
         """

@@ -60,7 +60,6 @@ class Claim:
 
         Parameters
         ----------
-        folder : Path
         alone : bool
             Whether no other process of this machine works there, since the caller holds its flock:
             whoever of this machine claimed it has ended then.
@@ -157,7 +156,6 @@ def owner_of(folder: Path, here: bool = False) -> Owner | None:
 
     Parameters
     ----------
-    folder : Path
     here : bool
         Whether processes of this machine count. Where flock works, that is the better answer: one
         that was killed just now does not hold it.

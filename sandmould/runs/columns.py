@@ -98,7 +98,6 @@ def total_s(summary: pd.DataFrame, column: str) -> float:
 
     Parameters
     ----------
-    summary : DataFrame
     column : str
         ``WALL_S`` or ``CPU_S``.
     """

@@ -35,7 +35,6 @@ def files_below(folder: Path, names: tuple[str, ...] | None = None) -> dict[str,
 
     Parameters
     ----------
-    folder : Path
     names : tuple of str, optional
         Files and folders that count; all unless given.
     """
@@ -69,10 +68,7 @@ def write_manifest(
 
     Parameters
     ----------
-    folder : Path
     step : str
-    sizes : mapping of str to int
-        Bytes of each file.
     origin : mapping, optional
         Provenance of what was computed.
     cost : mapping, optional
@@ -135,7 +131,6 @@ def damage(folder: Path, sizes: Mapping[str, Any]) -> str:
 
     Parameters
     ----------
-    folder : Path
     sizes : mapping of str to int
         Bytes of each file, by its path from the folder.
     """

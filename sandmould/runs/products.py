@@ -114,13 +114,8 @@ def finish(
 
     Parameters
     ----------
-    folder : Path
-        Of the run.
     products : sequence of str
         Files and folders of ``folder/work`` that are kept.
-    outcome : RunOutcome
-    cost : Cost
-    provenance : dict
     """
     work = folder / "work"
     for name in products:

@@ -50,7 +50,6 @@ def read_tables(
 
     Parameters
     ----------
-    paths : sequence of Path
     check : callable
         Gives a table as it is kept; raises what a file cannot be read for.
     """

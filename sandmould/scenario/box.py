@@ -67,8 +67,6 @@ class Box(Section):
         Parameters
         ----------
         points_m : (n, d) float64, m
-        dimension : int
-        slack : float, optional
         """
         size_m = np.array(self.size_m(dimension))
         slack_m = slack * size_m.max()
@@ -293,9 +291,6 @@ def piston_wall(piston: Piston, box: Box, dimension: int, way_m: float) -> Wall:
 
     Parameters
     ----------
-    piston : Piston
-    box : Box
-    dimension : int
     way_m : float, m
         Into the box.
     """

@@ -93,7 +93,6 @@ def inward(cavity: AnyCavity, dimension: int, key: str) -> Array:
     Parameters
     ----------
     cavity : cavity of any kind
-    dimension : int
     key : str
         Key path of the cavity, for messages.
 
@@ -126,7 +125,6 @@ def cavity_space(cavity: AnyCavity, dimension: int, key: str) -> Cavity:
     Parameters
     ----------
     cavity : cavity of any kind
-    dimension : int
     key : str
         Key path of the cavity, for messages.
 
@@ -173,10 +171,8 @@ def cavity_grid(
 
     Parameters
     ----------
-    cavity : Cavity
     spacing_m : float, m
         Longest edge of a cell; longer where there would be too many.
-    most_points : int
     margin_m : float, m, optional
         How far the grid goes beyond the box round the cavity.
     """

@@ -177,9 +177,6 @@ class Contact(Section):
         ----------
         law : ContactLaw
             One of the two.
-        dimension : int
-        step_s : float
-            Time step.
         """
         return {
             **{symbol: getattr(law, key) for symbol, key in SYMBOLS.items()},
@@ -220,10 +217,8 @@ def wave_speed_m_s(sand: Sand, contact: Contact, dimension: int) -> float:
 
     Parameters
     ----------
-    sand : Sand
     contact : Contact
         Springs as they are computed with.
-    dimension : int
     """
     diameter_m = sand.mass_median_diameter_m
     mass_kg = sand.grain_mass_kg(diameter_m, dimension)

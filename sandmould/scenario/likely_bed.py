@@ -51,7 +51,6 @@ def likely_bed(s: Scenario, cut_m: float | None = None) -> LikelyBed:
 
     Parameters
     ----------
-    s : Scenario
     cut_m : float, m, optional
         y at which the slice begins of a box with too many grains; it lies in the middle unless
         given.

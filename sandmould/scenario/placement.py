@@ -196,10 +196,8 @@ def plan_layer(s: Scenario, number: int, count: int) -> PlannedLayer:
 
     Parameters
     ----------
-    s : Scenario
     number : int
         Number of the layer, or of the portion of one, from 1; with the seed it fixes the draw.
-    count : int
     """
     if s.fill.grains and number == 1:
         return placed_grains(s)

@@ -66,7 +66,6 @@ def damped_step(omega_rad_s: float, damping_ratio: float, correction_per_s: floa
 
     Parameters
     ----------
-    omega_rad_s : float
     damping_ratio : float
         xi of the mode, that of plain dashpots.
     correction_per_s : float
@@ -128,11 +127,8 @@ def critical_step(
 
     Parameters
     ----------
-    sand : Sand
-    contact : Contact
     time_step : TimeStep
         Its rotational inertia counts.
-    dimension : int
 
     Notes
     -----

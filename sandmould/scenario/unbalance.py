@@ -108,7 +108,6 @@ class Unbalance(Section):
 
         Parameters
         ----------
-        angular_frequency_rad_s : float
         sand_kg : float
             All sand, as the table feels it.
         """

@@ -31,7 +31,6 @@ def in_unit(value: object, stated: object, units: Iterable[str]) -> str:
 
     Parameters
     ----------
-    value : any
     stated : any
         Its unit as written.
     units : iterable of str

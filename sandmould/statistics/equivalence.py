@@ -68,7 +68,6 @@ def agree(first: pd.Series[float], second: pd.Series[float], margin: float) -> A
     first, second : Series of float
         Values by block: replicates that share their seeds have one label. Blocks that both have
         are compared in pairs; without a common one the groups are compared by Welch's test.
-    margin : float
     """
     shared = first.index.intersection(second.index)
     if len(shared):

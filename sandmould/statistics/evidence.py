@@ -36,8 +36,6 @@ def loop_fails(summary: pd.DataFrame, measure: str) -> pd.Series[bool]:
 
     Parameters
     ----------
-    summary : DataFrame
-        One row a run.
     measure : str
         What it would be evidence of: measures of the loop itself need no loop that holds.
     """

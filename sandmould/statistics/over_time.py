@@ -42,7 +42,6 @@ def passage_of(curves: pd.DataFrame, runs: Iterable[str], measure: str) -> Passa
         One row a snapshot.
     runs : iterable of str
         Names of runs that count.
-    measure : str
 
     Returns
     -------
@@ -66,7 +65,6 @@ def reached_s(curves: pd.DataFrame, runs: Iterable[str], measure: str, level: fl
     ----------
     curves, runs, measure
         As of ``passage_of``.
-    level : float
     """
     shaken = _shaken(curves, runs, measure)
     times_s = [
@@ -88,7 +86,6 @@ def first_reach_s(time_s: ArrayLike, value: ArrayLike, level: float) -> float:
     ----------
     time_s, value : (n,) float64
         In order of time.
-    level : float
 
     Returns
     -------

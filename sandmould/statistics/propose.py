@@ -27,10 +27,6 @@ def propose(
 
     Parameters
     ----------
-    optimum : Optimum
-    summary : DataFrame
-        One row a run of all that was computed, finished or not.
-    runs : int
     seed : int
         Another one for every round.
     whole : collection of str

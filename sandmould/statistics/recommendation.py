@@ -64,10 +64,8 @@ def recommend(
 
     Parameters
     ----------
-    robustness : Robustness
     interval_hz : (float, float)
         95 % interval of the optimum.
-    model : ModelWaveSpeed
     sand : SandWaveSpeed, optional
         Of the real sand, from a source.
 

@@ -68,7 +68,6 @@ def refining_of(key: str, at: Sequence[tuple[float, float]]) -> Refining | None:
 
     Parameters
     ----------
-    key : str
     at : sequence of (float, float)
         Size and value of each level.
 

@@ -124,8 +124,6 @@ def compare(best: Setting, others: Sequence[Setting], spread: Spread) -> tuple[C
 
     Parameters
     ----------
-    best : Setting
-    others : sequence of Setting
     spread : Spread
         Of all settings, by which they are compared.
     """

@@ -178,9 +178,6 @@ def compare_study(summary: pd.DataFrame, keys: Sequence[str], study: Study) -> t
     ----------
     summary : DataFrame
         One row a run; runs of the cross check have it in their column ``part``.
-    keys : sequence of str
-        Swept keys.
-    study : Study
 
     Returns
     -------
@@ -289,7 +286,6 @@ def shares_of_fills(fills: pd.Series[str], study_folder: Path) -> dict[str, pd.S
     ----------
     fills : Series of str
         Name of each run's fill; missing for a run that shares none.
-    study_folder : Path
 
     Returns
     -------

@@ -14,12 +14,6 @@ from sandmould.study.rounds.round_log import RoundLog, read_rounds, write_rounds
 def decide_next(study: Study, folder: Path) -> tuple[RoundLog, str]:
     """Add what comes next to the rounds of a study.
 
-    Parameters
-    ----------
-    study : Study
-    folder : Path
-        ``results/<study>``, with the tables of all runs so far.
-
     Returns
     -------
     RoundLog, str

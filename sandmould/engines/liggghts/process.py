@@ -76,12 +76,8 @@ class Conversation:
 
         Parameters
         ----------
-        path : str
-            The executable.
         folder : Path
             Working folder, so that a deck's relative names hold.
-        log : Path
-            LIGGGHTS's own log.
         """
         self._screen, theirs = pty.openpty()
         _keep_line_ends(theirs)

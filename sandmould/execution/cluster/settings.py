@@ -82,13 +82,7 @@ def may_be_elsewhere(arguments: Sequence[str]) -> bool:
 
 
 def goes_to_slurm(arguments: Sequence[str]) -> bool:
-    """Whether Snakemake called with these arguments submits jobs to Slurm, as its profile says.
-
-    Parameters
-    ----------
-    arguments : sequence of str
-        The command line.
-    """
+    """Whether Snakemake called with these arguments submits jobs to Slurm, as its profile says."""
     words = [
         word for argument in arguments for word in re.split("(?<=[a-z])=", argument, maxsplit=1)
     ]

@@ -33,7 +33,6 @@ class Submission:
 
         Parameters
         ----------
-        plan : Plan
         cluster : Cluster or None
             None where jobs are of this machine.
         """
@@ -136,7 +135,6 @@ def open_submission(plan: Plan, arguments: Sequence[str], stated: Mapping[str, A
 
     Parameters
     ----------
-    plan : Plan
     arguments : sequence of str
         Snakemake's command line.
     stated : mapping

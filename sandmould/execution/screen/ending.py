@@ -24,8 +24,6 @@ def trouble(folder: Path, log: Path) -> str:
 
     Parameters
     ----------
-    folder : Path
-        ``results/<study>``.
     log : Path
         Snakemake's.
     """
@@ -50,13 +48,7 @@ def trouble(folder: Path, log: Path) -> str:
 
 
 def last_line(folder: Path) -> str:
-    """The verdict's sentence and where the report is; empty without a report.
-
-    Parameters
-    ----------
-    folder : Path
-        ``results/<study>``.
-    """
+    """The verdict's sentence and where the report is; empty without a report."""
     report, verdict = folder / REPORT_FILE, folder / VERDICT_FILE
     if not report.exists():
         return ""

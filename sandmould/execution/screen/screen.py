@@ -55,10 +55,6 @@ class Screen:
 
         Parameters
         ----------
-        plan : Plan
-        results : Path
-        cores : int
-            That share the runs.
         live : bool, optional
             Whether to draw a table again and again; by default where stderr is a terminal that
             can.

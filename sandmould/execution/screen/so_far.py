@@ -84,9 +84,6 @@ def so_far_text(summary: pd.DataFrame, study: Study, settings: int) -> str:
 
     Parameters
     ----------
-    summary : DataFrame
-        One row a run that has ended.
-    study : Study
     settings : int
         That are planned: before each has a value, none is called the best.
 

@@ -24,7 +24,6 @@ def study_table(view: StudyView, width: int, height: int) -> RenderableType:
 
     Parameters
     ----------
-    view : StudyView
     width, height : int
         Columns and lines of the terminal.
     """

@@ -130,8 +130,6 @@ def add_loop(table: pd.DataFrame, folder: Path, reach_m: float) -> pd.DataFrame:
     ----------
     table : DataFrame
         Rows of ``measures.tsv`` in order of time.
-    folder : Path
-        The run's folder.
     reach_m : float, m
         Arm that a moment left over is compared with.
 

@@ -22,9 +22,6 @@ def write_bent(scenario: Scenario, run_folder: Path, out: Path) -> None:
 
     Parameters
     ----------
-    scenario : Scenario
-        With a pattern.
-    run_folder : Path
     out : Path
         Folder of ``pattern_filled.stl`` and its likes.
     """
@@ -48,10 +45,6 @@ def write_solids(scenario: Scenario, moments: tuple[Moment, ...], out: Path) -> 
 
     Parameters
     ----------
-    scenario : Scenario
-        With a pattern.
-    moments : tuple of Moment
-        Of a run.
     out : Path
         Folder of ``pattern_settle_1.vtu`` and its likes.
     """

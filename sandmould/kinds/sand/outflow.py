@@ -182,15 +182,7 @@ def _floor(scenario: Scenario) -> tuple[np.ndarray, np.ndarray]:
 
 
 def add_outflow(table: pd.DataFrame, folder: Path) -> pd.DataFrame:
-    """Add what only the whole run tells to all rows of its measures.
-
-    Parameters
-    ----------
-    table : DataFrame
-        Rows of ``measures.tsv``.
-    folder : Path
-        The run's folder.
-    """
+    """Add what only the whole run tells to all rows of its measures."""
     if "outflow_fraction" not in table:
         return table
     loads = pd.read_csv(folder / "loads.tsv", sep="\t")

@@ -133,7 +133,6 @@ def free_share(s: Scenario, number: int) -> float:
 
     Parameters
     ----------
-    s : Scenario
     number : int
         Of the cavity, from 0.
 

@@ -41,7 +41,6 @@ def thinnest_wall(bodies: Sequence[Body], below_m: float) -> ThinWall | None:
     ----------
     bodies : sequence of Body
         Parts that touch are one.
-    below_m : float, m
 
     Returns
     -------

@@ -60,8 +60,6 @@ def plan_batches(
 
     Parameters
     ----------
-    runs : sequence of Run
-    wall_s : float, s
     cores : int
         That a job should have; runs that leave some of them free are computed side by side. One
         run under MPI has a job's cores for itself.
@@ -128,11 +126,8 @@ def mark_done(batches: Iterable[Batch], lacking: Container[str], folder: Path) -
 
     Parameters
     ----------
-    batches : iterable of Batch
     lacking : container of str
         Names of runs that lack something.
-    folder : Path
-        ``results/<study>``.
     """
     for batch in batches:
         if batch.runs[0].part == FILL:

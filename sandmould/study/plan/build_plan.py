@@ -167,13 +167,7 @@ _LOOKS = (
 
 
 def starts_jobs(arguments: Sequence[str]) -> bool:
-    """Whether Snakemake called with these arguments computes, or only looks.
-
-    Parameters
-    ----------
-    arguments : sequence of str
-        The command line.
-    """
+    """Whether Snakemake called with these arguments computes, or only looks."""
     short = [a for a in arguments if re.fullmatch("-[a-zA-Z]+", a)]
     looks = any(a.split("=")[0] in _LOOKS for a in arguments)
     return not looks and not any(set(a) & set("nSDl") for a in short)
@@ -202,9 +196,6 @@ def open_plan(path: Path, results: Path = RESULTS, text: str | None = None) -> P
 
     Parameters
     ----------
-    path : Path
-    results : Path
-        Where finished studies lie that this one may rest on.
     text : str, optional
         What the study's file will hold, where it is not written yet.
 
@@ -271,12 +262,6 @@ def _sound_runs(study: OpenStudy, results: Path) -> tuple[list[Run], list[Run]]:
 def checked_plan(path: Path, text: str | None = None) -> Plan:
     """Open, validate and expand a study whose runs are to start.
 
-    Parameters
-    ----------
-    path : Path
-    text : str, optional
-        What its file will hold, where it is not written yet.
-
     Raises
     ------
     BadInputError
@@ -330,10 +315,6 @@ def announce(
 
     Parameters
     ----------
-    plan : Plan
-    results : Path
-    cores : int
-        That share the runs.
     measure : {"nothing", "engines", "all"}
         What is measured first where this machine's speed is not known, which takes seconds an
         engine. With "nothing" no engine starts, and the price is an estimate there. With "engines"
@@ -376,9 +357,6 @@ def prepare(
 
     Parameters
     ----------
-    plan : Plan
-    results : Path
-    batches : sequence of Batch
     found : dict, optional
         What runs lack; ``plan.lacks`` says so unless it is given.
 

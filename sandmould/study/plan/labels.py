@@ -14,15 +14,7 @@ class Labels:
     """Labels of a study's points, each its own."""
 
     def __init__(self, scenario: type[Section], has_units: bool) -> None:
-        """Begin with none.
-
-        Parameters
-        ----------
-        scenario : type of Section
-            That of the scenario, which says what unit a key ends with.
-        has_units : bool
-            Whether the unit stands in the label.
-        """
+        """Begin with none."""
         self._scenario, self._has_units = scenario, has_units
         self._point: dict[str, Point] = {}
 
@@ -39,7 +31,6 @@ def run_label(parameters: Point, scenario: type[Section], has_units: bool) -> st
 
     Parameters
     ----------
-    parameters : Point
     scenario : type of Section
         That of the scenario, which says what unit a key ends with.
     has_units : bool

@@ -91,17 +91,6 @@ class StudyFile:
 def open_study(path: Path, text: str | None = None) -> OpenStudy:
     """Read a study with all that it is based on, and check it.
 
-    Parameters
-    ----------
-    path : Path
-        Its stem is the study's name.
-    text : str, optional
-        What its file will hold, where it is not written yet.
-
-    Returns
-    -------
-    OpenStudy
-
     Raises
     ------
     BadInputError
@@ -211,13 +200,7 @@ def _check_material(material: StudyFile, model: type[BaseModel]) -> None:
 
 
 def materials(model: type[BaseModel]) -> list[str]:
-    """Names of the materials that a kind of study can use.
-
-    Parameters
-    ----------
-    model : type
-        What a material of that kind states.
-    """
+    """Names of the materials that a kind of study can use."""
     names = set()
     for path in _yaml_files(MATERIALS):
         with contextlib.suppress(BadInputError):

@@ -30,8 +30,6 @@ def problems(study: Study, kind: Kind[Any], scenario: AnyScenario) -> Iterator[P
 
     Parameters
     ----------
-    study : Study
-    kind : Kind
     scenario : scenario of any kind
         At one point of the sweep.
     """
@@ -49,14 +47,7 @@ def problems(study: Study, kind: Kind[Any], scenario: AnyScenario) -> Iterator[P
 
 
 def problems_elsewhere(study: Study, results: Path) -> Iterator[Problem]:
-    """List what keeps a study from calibrating with the results of others.
-
-    Parameters
-    ----------
-    study : Study
-    results : Path
-        Folder of all results.
-    """
+    """List what keeps a study from calibrating with the results of others."""
     for i, name in enumerate(study.calibration.also):
         summary = results / name / "summary.tsv"
         if not summary.is_file():

@@ -55,13 +55,6 @@ def owner_path(folder: Path) -> Path | None:
 def check_owner(path: Path, folder: Path) -> None:
     """Refuse results that belong to another study file of the same name, while that is there.
 
-    Parameters
-    ----------
-    path : Path
-        The study's file.
-    folder : Path
-        ``results/<study>``.
-
     Raises
     ------
     BadInputError

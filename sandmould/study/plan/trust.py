@@ -19,7 +19,6 @@ def outside(study: OpenStudy, scenario: AnyScenario) -> list[Problem]:
 
     Parameters
     ----------
-    study : OpenStudy
     scenario : scenario of the study's kind
         Of any point: files can be swept.
 

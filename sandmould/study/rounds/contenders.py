@@ -57,9 +57,6 @@ def find_contenders(summary: pd.DataFrame, study: Study, keys: list[str]) -> Con
     ----------
     summary : DataFrame
         One row a run of the sweep and of all rounds so far.
-    study : Study
-    keys : list of str
-        Swept keys.
 
     Returns
     -------
@@ -100,7 +97,6 @@ def why_decided(contenders: Contenders, half_width: float | None) -> str:
 
     Parameters
     ----------
-    contenders : Contenders
     half_width : float, optional
         That is small enough.
     """

@@ -115,8 +115,6 @@ def render(scenario: OwnDeck, run: str, study: str, restart: str = "") -> str:
 
     Parameters
     ----------
-    scenario : OwnDeck
-    run, study : str
     restart : str
         Restart file that the deck is to go on from; empty at the beginning.
 

@@ -19,9 +19,6 @@ def measured(scenario: OwnDeck, table: pd.DataFrame, output: Path) -> pd.DataFra
 
     Parameters
     ----------
-    scenario : OwnDeck
-    table : DataFrame
-        The log.
     output : Path
         Folder that the deck writes its dumps into.
     """

@@ -126,9 +126,6 @@ def findings(file: str, text: str, is_template: bool = False) -> Iterator[Findin
 
     Parameters
     ----------
-    file : str
-        Name in the findings.
-    text : str
     is_template : bool
         Whether Jinja's statements stand in it.
     """
