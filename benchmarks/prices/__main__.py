@@ -27,8 +27,7 @@ from benchmarks.frame import SCRATCH, Benchmark, BenchmarkRun, children_s, rende
 from sandmould import ROOT
 from sandmould.bad_input import BadInputError
 from sandmould.definition.run import Run
-from sandmould.execution.packs.recorded import RECORDS
-from sandmould.execution.records import OLDER_SOLVER, runs_in, why_stale
+from sandmould.execution.records import OLDER_SOLVER, RECORDS, runs_in, why_stale
 from sandmould.kinds.kind import CORE_SECONDS, SpeedClass
 from sandmould.kinds.registry import kind_of
 from sandmould.runs.columns import CPU_S, FILL_CPU_S, RUN, WALL_S, finished, total_s

@@ -13,7 +13,6 @@ from pathlib import Path
 from sandmould import SHIPPED
 from sandmould.definition.run import LAST_MEASURED
 from sandmould.digest import digest
-from sandmould.execution.packs.recorded import record_of
 from sandmould.execution.spent import SPENT_FILE
 from sandmould.plain_file import UNREADABLE, read_plain
 from sandmould.runs.claim import CLAIM_FILE
@@ -66,4 +65,3 @@ def _looked_at(plan: Plan, results: Path) -> Iterator[Path]:
     yield from (results / name / SUMMARY for name in plan.study.study.calibration.also)
     for rules in ("Snakefile", "workflow/rules/*", "templates/report/*"):
         yield from sorted(SHIPPED.glob(rules))
-    yield record_of(plan)

@@ -13,7 +13,6 @@ from sandmould.execution.cluster.settings import goes_to_slurm, may_be_elsewhere
 from sandmould.execution.cluster.submission import open_submission
 from sandmould.execution import jobs
 from sandmould.execution.locks import hold_turn
-from sandmould.execution.packs.recorded import take_up
 from sandmould.execution.pool import start_server
 from sandmould.execution.spent import note_spent
 from sandmould.study.plan.batches import alone, read_batches, write_batches
@@ -45,9 +44,6 @@ try:
     starts = workflow.is_main_process and starts_jobs(sys.argv)
     if starts:
         hold_turn(RESULTS / PLAN.study.name)
-        PLAN, taken = take_up(PLAN, RESULTS)
-        if taken:
-            say(taken)
     STATED = workflow.resource_settings.default_resources or {}
     SUBMISSION = open_submission(PLAN, sys.argv, STATED)
     is_here = workflow.is_main_process and not may_be_elsewhere(sys.argv)
