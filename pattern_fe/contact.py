@@ -51,7 +51,7 @@ def touch(
     response: Response,
     pressed: NDArray[np.bool_] | None = None,
 ) -> Touch | None:
-    """Find the reactions that keep a motion out of what surrounds a pattern.
+    """Find the reactions that keep a motion out of what surrounds a pattern; None where none press.
 
     Parameters
     ----------
@@ -62,11 +62,6 @@ def touch(
     pressed : (nv,) bool, optional
         Vertices with reactions before, whose closed gaps are taken to stay closed unless they are
         found to pull: a pattern that only its contacts keep from buckling has no stiffness without.
-
-    Returns
-    -------
-    Touch or None
-        None where nothing presses.
 
     Raises
     ------

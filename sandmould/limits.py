@@ -49,12 +49,7 @@ class Limit:
         return f"with at most {self.most:,} {self.what}, not {_number(count)}: {self.change}"
 
     def check(self, key: str, count: float, value: Any = None) -> None:
-        """Refuse a count beyond the limit; parameters as in ``problems``.
-
-        Raises
-        ------
-        BadInputError
-        """
+        """Refuse a count beyond the limit; parameters as in ``problems``."""
         if found := [*self.problems(key, count, value)]:
             raise BadInputError(found)
 

@@ -71,17 +71,12 @@ def _draw_scene(scenario: Scenario, ax: Axes, height_m: float, at: Snapshot | st
 
 
 def draw_dimensions(scenario: Scenario, bed_height_m: float | None) -> str:
-    """Draw the scene to scale with its dimensions in mm.
+    """Draw the scene to scale with its dimensions in mm: SVG as a ``data:`` address.
 
     Parameters
     ----------
     bed_height_m : float, m, optional
         Height of the filled bed, shown as a line.
-
-    Returns
-    -------
-    str
-        SVG as a ``data:`` address.
     """
     return _address("image/svg+xml", svg_bytes(dimensioned(scenario, bed_height_m)))
 
@@ -207,13 +202,7 @@ class DensityScale:
 def draw_layers(
     snapshots: Sequence[Snapshot], scenario: Scenario, height_m: float
 ) -> tuple[str, ...]:
-    """Draw each snapshot with its grains in the colour of their layer of fill.
-
-    Returns
-    -------
-    tuple of str
-        PNG as ``data:`` addresses.
-    """
+    """Draw each snapshot with grains in the colour of their layer: PNG as ``data:`` addresses."""
 
     def layers(ax: Axes, snapshot: Snapshot) -> None:
         draw_by_layer(snapshot, ax, cut_m(scenario))

@@ -99,7 +99,7 @@ class TablePeriods:
     def add(
         self, stage: str, frequency_hz: float, periods: int, offset_s: float, window: Window
     ) -> list[TablePeriod]:
-        """Take in a window.
+        """Take in a window; gives the periods that have ended in it.
 
         Parameters
         ----------
@@ -107,11 +107,6 @@ class TablePeriods:
             Of the stage; steps after the last one are left out.
         offset_s : float
             Time of vibration when the stage began.
-
-        Returns
-        -------
-        list of TablePeriod
-            Periods that have ended in it.
         """
         self.steps = np.concatenate([self.steps, np.column_stack(window)])
         number = np.floor(self.steps[:, 0] * frequency_hz + 1e-9).astype(np.int64)

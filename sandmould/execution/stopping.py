@@ -102,11 +102,6 @@ def run_in_group(
     asked_first : bool
         Whether it is first asked to end, as Snakemake must be to cancel jobs elsewhere.
 
-    Returns
-    -------
-    int
-        Exit status.
-
     Raises
     ------
     Stopped

@@ -49,12 +49,7 @@ class StoredSpeed(ABC, Generic[SceneT]):
         return self.rate(scenario, found) if 0.0 < found < math.inf else None
 
     def measured(self, scenario: SceneT, results: Path) -> float | None:
-        """The same, measured now and stored where it was not before.
-
-        Returns
-        -------
-        float or None
-            None where nothing could be measured: the study's own runs will say why.
+        """The same, measured now and stored where it was not before; None where it cannot be.
 
         Raises
         ------

@@ -39,11 +39,6 @@ def write_spreadsheet(study_folder: Path, out: Path) -> None:
         ``results/<study>`` with its collected tables.
     out : Path
         The ``.xlsx`` file.
-
-    Raises
-    ------
-    OSError, ValueError
-        When a collected table cannot be read.
     """
     objective, collected = read_study(study_folder).objective, read_collected(study_folder)
     keys, summary = collected.keys, collected.of_sweep.summary

@@ -125,13 +125,7 @@ def share_of_what_fits(
 
 
 def key_numbers(summary: pd.DataFrame) -> tuple[KeyNumber, ...]:
-    """Runs that finished, size, cost and health of the runs.
-
-    Returns
-    -------
-    tuple of KeyNumber
-        Without those whose data are missing.
-    """
+    """Runs that finished, size, cost and health of the runs, as far as their data are there."""
     numbers: list[KeyNumber] = []
     complete = summary[finished(summary)]
     checks = PART in summary and (summary[PART] != SWEEP).any()
@@ -255,17 +249,12 @@ _COST = (
 def runs_table(
     summary: pd.DataFrame, keys: Sequence[str], verdict: Verdict, runs_href: str
 ) -> Table:
-    """Every run with its parameters, outcome, objective and cost.
+    """Every run with its parameters, outcome, objective and cost; why one is left out is said.
 
     Parameters
     ----------
     runs_href : str
         Address of the folder of runs, seen from the report.
-
-    Returns
-    -------
-    Table
-        Runs that are left out of the verdict are marked and say why.
     """
     cost = [c for c in _COST if c[0] in summary]
     blocks = [c for c in (REPLICATE, SEED) if c in summary]

@@ -34,7 +34,7 @@ class Passage:
 
 
 def passage_of(curves: pd.DataFrame, runs: Iterable[str], measure: str) -> Passage | None:
-    """A measure of some runs over their vibration.
+    """A measure of some runs over their vibration; None where no run tells.
 
     Parameters
     ----------
@@ -42,11 +42,6 @@ def passage_of(curves: pd.DataFrame, runs: Iterable[str], measure: str) -> Passa
         One row a snapshot.
     runs : iterable of str
         Names of runs that count.
-
-    Returns
-    -------
-    Passage or None
-        None where no run tells.
     """
     shaken = _shaken(curves, runs, measure)
     passages = []

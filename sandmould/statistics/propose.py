@@ -31,10 +31,6 @@ def propose(
         Another one for every round.
     whole : collection of str
         Keys that take whole numbers only.
-
-    Returns
-    -------
-    list of (point, replicate)
     """
     keys = optimum.keys
     rng = np.random.default_rng([seed, runs])

@@ -60,7 +60,7 @@ def recommend(
     model: ModelWaveSpeed,
     sand: SandWaveSpeed | None,
 ) -> Recommendation | None:
-    """Recommend a frequency where the controls allow it.
+    """Recommend a frequency where the controls allow it; None where springs were not controlled.
 
     Parameters
     ----------
@@ -68,11 +68,6 @@ def recommend(
         95 % interval of the optimum.
     sand : SandWaveSpeed, optional
         Of the real sand, from a source.
-
-    Returns
-    -------
-    Recommendation or None
-        None where the control of the springs was not run.
     """
     if robustness.springs is None:
         return None

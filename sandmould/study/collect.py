@@ -172,17 +172,12 @@ def _read_table(path: Path, words: Sequence[str]) -> pd.DataFrame:
 
 
 def compare_study(summary: pd.DataFrame, keys: Sequence[str], study: Study) -> tuple[Compared, ...]:
-    """Compare all that a study wants compared.
+    """Compare all that a study wants compared; empty where that is nothing.
 
     Parameters
     ----------
     summary : DataFrame
         One row a run; runs of the cross check have it in their column ``part``.
-
-    Returns
-    -------
-    tuple of Compared
-        Empty where the study compares nothing.
     """
     equivalence = study.equivalence
     swept = sweep_part(summary)
@@ -286,11 +281,6 @@ def shares_of_fills(fills: pd.Series[str], study_folder: Path) -> dict[str, pd.S
     ----------
     fills : Series of str
         Name of each run's fill; missing for a run that shares none.
-
-    Returns
-    -------
-    dict of str to Series
-        Columns for the summary, s.
     """
     names = fills.dropna().unique()
     costs = read_costs([study_folder / FILLS / name for name in names])

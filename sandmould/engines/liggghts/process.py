@@ -98,12 +98,7 @@ class Conversation:
         self._heard = b""
 
     def say(self, commands: str) -> str:
-        """Have commands executed and wait for their end.
-
-        Returns
-        -------
-        str
-            What LIGGGHTS printed meanwhile.
+        """Have commands executed and wait for their end; gives what LIGGGHTS printed meanwhile.
 
         Raises
         ------

@@ -124,13 +124,7 @@ def _deck(folder: Path) -> str:
 
 
 def _take_rounds(text: bytes, path: Path) -> dict[str, str]:
-    """Take the bytes of a ``rounds.json`` that begins as ours; why not, where others were chosen.
-
-    Raises
-    ------
-    ValueError
-        When they are no list of rounds.
-    """
+    """Take the bytes of a ``rounds.json`` that begins as ours; why not, where others were taken."""
     theirs = log_of(text)
     ours = log_of(path.read_bytes()) if path.is_file() else RoundLog(theirs.basis)
     both = min(len(theirs.rounds), len(ours.rounds))

@@ -319,11 +319,6 @@ def announce(
         What is measured first where this machine's speed is not known, which takes seconds an
         engine. With "nothing" no engine starts, and the price is an estimate there. With "engines"
         a program of the user's is not started: that is left to the start of its runs, "all".
-
-    Raises
-    ------
-    BadInputError
-        When the results cannot be written, or as of ``measure_speeds``.
     """
     write_files(plan, results)
     if measure == "all" or (measure == "engines" and plan.kind.planning.program is None):
@@ -333,13 +328,7 @@ def announce(
 
 
 def write_files(plan: Plan, results: Path) -> None:
-    """Write the plan to disk, what differs of it.
-
-    Raises
-    ------
-    BadInputError
-        When the results cannot be written.
-    """
+    """Write the plan to disk, what differs of it."""
     folder = results / plan.study.name
     with writing(folder):
         write_owner(plan.study.path, folder)
@@ -364,11 +353,6 @@ def prepare(
     -------
     str
         Which runs are computed or measured again, and why.
-
-    Raises
-    ------
-    BadInputError
-        When the results cannot be written.
     """
     folder = results / plan.study.name
     with writing(folder):

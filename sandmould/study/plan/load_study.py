@@ -89,13 +89,7 @@ class StudyFile:
 
 
 def open_study(path: Path, text: str | None = None) -> OpenStudy:
-    """Read a study with all that it is based on, and check it.
-
-    Raises
-    ------
-    BadInputError
-        With one line a problem, each naming the file that holds the bad value.
-    """
+    """Read a study with all that it is based on, and check it."""
     return study_of(study_files(path, text))
 
 

@@ -48,7 +48,7 @@ class Contenders:
 
 
 def find_contenders(summary: pd.DataFrame, study: Study, keys: list[str]) -> Contenders | None:
-    """Find the settings that are not ruled out by the runs so far.
+    """Find the settings that runs so far do not rule out; None where no two can be compared.
 
     Settings are compared as in the report, so that one that gets no more runs is one that the
     report calls worse.
@@ -57,11 +57,6 @@ def find_contenders(summary: pd.DataFrame, study: Study, keys: list[str]) -> Con
     ----------
     summary : DataFrame
         One row a run of the sweep and of all rounds so far.
-
-    Returns
-    -------
-    Contenders or None
-        None where no two settings can be compared.
     """
     objective = study.objective
     verdict = compare_settings(summary, keys, objective.measure, objective.better)
