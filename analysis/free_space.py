@@ -62,8 +62,6 @@ def free_part(position_m: Array, radius_m: Array, scene: Scene) -> Array:
     ----------
     position_m : (n, d) float64, m
     radius_m : (n,) float64, m
-    scene : Scene
-        In 3D every wall must be upright or level.
 
     Returns
     -------
@@ -125,8 +123,6 @@ def free_measure_between(scene: Scene, edges_m: Array) -> Array:
 
     Parameters
     ----------
-    scene : Scene
-        Its walls must close the box on every side; in 3D they must be upright or level.
     edges_m : (m + 1,) float64, m
         Rising heights.
 

@@ -76,11 +76,6 @@ def scene_section(scene: Scene, height_m: float, cut_m: float | None = None) -> 
 def draw_scene(scene: Scene, ax: Axes, height_m: float, cut_m: float | None = None) -> Axes:
     """Draw the box, open at the top, its solids, and bores and cavities as broken lines.
 
-    Parameters
-    ----------
-    cut_m : float, m, optional
-        In 3D, y of the plane shown; the middle of the box unless given.
-
     Raises
     ------
     ValueError

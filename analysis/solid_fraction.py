@@ -44,8 +44,6 @@ def solid_fraction_profile(
     ----------
     position_m : (n, d) float64, m
     radius_m : (n,) float64, m
-    scene : Scene
-        Its walls must close the box on every side; in 3D they must be upright or level.
     edges_m : (m + 1,) float64, m
         Rising heights.
 
@@ -95,8 +93,6 @@ def bed_surface_height_m(
     ----------
     position_m : (n, d) float64, m
     radius_m : (n,) float64, m
-    scene : Scene
-        Its walls must close the box on every side; in 3D they must be upright or level.
     column_width_m : float, m, optional
         Four times the largest radius unless given; stretched to a whole number of columns.
 

@@ -111,8 +111,6 @@ def space_of(mesh: Any, order: int = 2, thickness_m: float | None = None) -> Spa
     ----------
     mesh : skfem.Mesh
         Quadrilaterals, triangles, hexahedra or tetrahedra with straight edges.
-    order : int
-        Of the shape functions along an edge, 1 or 2.
     thickness_m : float, m
         Out of the plane: in 2D it must be given, in 3D it must not.
 

@@ -175,11 +175,6 @@ def problems_in_scene(own: Mapping[str, str], has: Collection[str]) -> Iterator[
 def with_own_measures(table: pd.DataFrame, own: Mapping[str, str]) -> pd.DataFrame:
     """Add a column for each own measure to a table of measures.
 
-    Parameters
-    ----------
-    own : mapping of str to str
-        Formulas that have no problems.
-
     Returns
     -------
     DataFrame

@@ -171,8 +171,6 @@ class FacetGrids:
         Parameters
         ----------
         dim : tuple of d floats
-        reach_m : float
-            How far from a grain's centre facets are asked for.
         """
         moved_m = math.inf
         if self._corner is arrays.corner:

@@ -216,8 +216,6 @@ def sphere_frames(
         Name of the run, and how the page calls it.
     scale : DensityScale
         Ends of the shades of density.
-    reading : ((k,) float64 s, (k,) float64), optional
-        Times and values of the objective.
     """
     most = max(2, min(MOST_FRAMES, MOST_BESIDE // max(1, len(_read(snapshots[-1]).id))))
     chosen = [snapshots[i] for i in evenly(len(snapshots), most).tolist()]

@@ -41,8 +41,6 @@ def until_stopped(work: Callable[[], int], name: str) -> int:
     ----------
     work : callable
         Gives the exit status.
-    name : str
-        What the command computes.
 
     Returns
     -------

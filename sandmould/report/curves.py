@@ -88,8 +88,6 @@ def time_chart(
     ----------
     curves, summary : DataFrame
         From :func:`sandmould.study.collect.collect`.
-    measure : str
-        A column of ``curves``.
     """
     if measure not in curves or not curves[measure].notna().any():
         return None

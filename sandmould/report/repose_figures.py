@@ -91,8 +91,6 @@ def draw_map(
     ----------
     keys : tuple of str
         The second goes along x, as in Figure 12 of the paper.
-    title : str
-        Of the measure.
     points : (n, 2) float64
         Values of the keys of the runs.
     sands : sequence of CalibratedSand

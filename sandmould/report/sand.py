@@ -59,8 +59,6 @@ def sand_pages(
         Of the run that is shown: the best one.
     href : str
         Address of the study's folder, seen from the report.
-    own_measures : iterable of str, optional
-        Names of the user's own measures.
 
     Returns
     -------

@@ -93,8 +93,6 @@ def inward(cavity: AnyCavity, dimension: int, key: str) -> Array:
     Parameters
     ----------
     cavity : cavity of any kind
-    key : str
-        Key path of the cavity, for messages.
 
     Returns
     -------
@@ -125,8 +123,6 @@ def cavity_space(cavity: AnyCavity, dimension: int, key: str) -> Cavity:
     Parameters
     ----------
     cavity : cavity of any kind
-    key : str
-        Key path of the cavity, for messages.
 
     Raises
     ------

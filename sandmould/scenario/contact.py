@@ -58,8 +58,6 @@ class ContactLaw(Section):
         ----------
         mass_kg : float
             m of eq. (21): m1 m2/(m1 + m2) of two grains, m1 at a wall.
-        lag_s : float
-            As ``Contact.lag_s`` gives it.
         """
         omega = math.sqrt(self.normal_stiffness_n_m / mass_kg)
         return self.damping_ratio / (1 + 0.5 * self.damping_ratio * omega * lag_s)

@@ -161,11 +161,6 @@ class Drawing(NamesFile, Protocol):
 def mesh_solid(solid: SolidMesh, key: str) -> TriangleMesh:
     """Geometry of a mesh, scaled and shifted into the box.
 
-    Parameters
-    ----------
-    key : str
-        Key path of the obstacle, for messages.
-
     Raises
     ------
     BadInputError
@@ -177,11 +172,6 @@ def mesh_solid(solid: SolidMesh, key: str) -> TriangleMesh:
 
 def drawn_surface(drawing: Drawing, key: str) -> tuple[Array, NDArray[np.int64]]:
     """Closed surface of a drawing about its own origin, scaled.
-
-    Parameters
-    ----------
-    key : str
-        Key path of its section, for messages.
 
     Returns
     -------

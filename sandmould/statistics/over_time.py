@@ -54,13 +54,7 @@ def passage_of(curves: pd.DataFrame, runs: Iterable[str], measure: str) -> Passa
 
 
 def reached_s(curves: pd.DataFrame, runs: Iterable[str], measure: str, level: float) -> float:
-    """Time of vibration after which some runs reach a level, as their mean; NaN where one does not.
-
-    Parameters
-    ----------
-    curves, runs, measure
-        As of ``passage_of``.
-    """
+    """Time of vibration after which runs reach a level, as their mean; NaN where one does not."""
     shaken = _shaken(curves, runs, measure)
     times_s = [
         first_reach_s(run[VIBRATION_TIME_S], run[measure], level) for _, run in shaken.groupby(RUN)

@@ -27,8 +27,6 @@ def propose(
 
     Parameters
     ----------
-    seed : int
-        Another one for every round.
     whole : collection of str
         Keys that take whole numbers only.
     """

@@ -68,8 +68,6 @@ def compare_settings(
     ----------
     summary : DataFrame
         One row a run, from :func:`sandmould.study.collect.collect`.
-    keys : sequence of str
-        Swept keys; a setting is a combination of their values.
     better : {"larger", "smaller", "neither"}
         Which values are better.
     """

@@ -58,11 +58,6 @@ class Submission:
     def ask(self, batches: Sequence[Batch]) -> None:
         """Ask Slurm whether it takes the jobs and what an earlier start has left in its queue.
 
-        Parameters
-        ----------
-        batches : sequence of Batch
-            Runs that share jobs.
-
         Raises
         ------
         BadInputError

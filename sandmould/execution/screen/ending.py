@@ -20,13 +20,7 @@ LISTED_LINES = 6
 
 
 def trouble(folder: Path, log: Path) -> str:
-    """Say why a study stopped outside its runs: a file that was refused, else Snakemake's words.
-
-    Parameters
-    ----------
-    log : Path
-        Snakemake's.
-    """
+    """Say why a study stopped outside its runs: a file that was refused, else Snakemake's words."""
     text = log.read_text(encoding="utf-8", errors="replace") if log.exists() else ""
     refused = [(after or before, why) for before, why, after in _REFUSED.findall(text)]
     try:  # a full disk has no room for the log either

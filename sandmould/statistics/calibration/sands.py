@@ -72,8 +72,6 @@ def calibrate(
 
     Parameters
     ----------
-    keys : tuple of str
-        The two swept keys.
     others : mapping of study to DataFrame, optional
         Summaries of the studies that ``calibration.also`` names.
     """

@@ -31,8 +31,6 @@ def run_label(parameters: Point, scenario: type[Section], has_units: bool) -> st
 
     Parameters
     ----------
-    scenario : type of Section
-        That of the scenario, which says what unit a key ends with.
     has_units : bool
         Whether the unit stands in the label.
     """
