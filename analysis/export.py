@@ -74,10 +74,7 @@ def elements_to_vtk(fields: Mapping[str, Array], path: Path) -> None:
     Elements that touch share corners. Cells have ``frozen_s``, ``temperature_k`` and ``melts`` (1
     in the casting).
 
-    Parameters
-    ----------
-    fields : mapping
-        Arrays ``position_m`` (n, d), ``size_m`` (n,) and those of the cells, (n,).
+    ``fields``: arrays ``position_m`` (n, d), ``size_m`` (n,) and those of the cells, (n,).
     """
     position_m, size_m = fields["position_m"], fields["size_m"]
     dimensions = position_m.shape[1]

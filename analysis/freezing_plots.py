@@ -27,10 +27,7 @@ def draw_freezing(
 ) -> None:
     """Draw freezing times over the casting with hot spots and the last point to freeze.
 
-    Parameters
-    ----------
-    distance_m : callable, optional
-        From the surface of what is cast, whose outline is then drawn.
+    ``distance_m``: from the surface of what is cast, whose outline is then drawn.
     """
     cut, axis, at_m = _cut(fields, freezing)
     melts = cut["melts"].astype(bool)

@@ -18,10 +18,7 @@ class ShapesFile:
     def __init__(self, path: Path, rows: int, vertices: int, dimension: int) -> None:
         """Open the file for appending after its trusted rows.
 
-        Parameters
-        ----------
-        rows : int
-            That a checkpoint vouches for; 0 begins anew.
+        ``rows``: those that a checkpoint vouches for; 0 begins anew.
         """
         self.rows = rows
         path.touch()

@@ -141,11 +141,8 @@ def _drawn(sweep: Sweep, whole: Mapping[str, bool], seed: int) -> Iterator[Point
 def points(sweep: Sweep, scenario: Any) -> list[Point]:
     """All points of a sweep that has no problems; an empty one where nothing is swept.
 
-    Parameters
-    ----------
-    scenario : scenario of any kind
-        What is varied: its type says which keys take whole numbers only, its seed fixes the
-        points of a drawn design.
+    ``scenario``: what is varied: its type says which keys take whole numbers only, its seed fixes
+    the points of a drawn design.
     """
     if sweep.design == "list":
         return [dict(p) for p in sweep.points]

@@ -240,10 +240,7 @@ def find_forces(dim: tuple[float, ...], scene: DemScene, moving: Moving) -> None
 
     Compiled code does not call it: with constants it would compile ``step_chunk`` a second time.
 
-    Parameters
-    ----------
-    dim : tuple
-        ``PLANE`` or ``SPACE``, which is also the shift, speed and body force: none.
+    ``dim``: ``PLANE`` or ``SPACE``, which is also the shift, speed and body force: none.
     """
     for c in range(len(moving.bound) - 1):
         step_chunk(dim, c, scene, moving, moving.grains, moving.ahead, dim, dim, dim, 0.0, False)

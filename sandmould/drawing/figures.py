@@ -71,13 +71,7 @@ def _draw_scene(scenario: Scenario, ax: Axes, height_m: float, at: Snapshot | st
 
 
 def draw_dimensions(scenario: Scenario, bed_height_m: float | None) -> str:
-    """Draw the scene to scale with its dimensions in mm: SVG as a ``data:`` address.
-
-    Parameters
-    ----------
-    bed_height_m : float, m, optional
-        Height of the filled bed, shown as a line.
-    """
+    """Draw the scene to scale with its dimensions in mm: SVG as a ``data:`` address."""
     return _address("image/svg+xml", svg_bytes(dimensioned(scenario, bed_height_m)))
 
 

@@ -54,10 +54,7 @@ def start_of_grains(
 def box_motion(scenario: Scenario, stage: Stage, steps: int, step_s: float) -> tuple[Array, Array]:
     """Displacement (d,) in m and velocity (d,) in m/s of the walls, zero in the box frame.
 
-    Parameters
-    ----------
-    steps : int
-        Steps since the stage began.
+    ``steps``: since the stage began.
 
     Notes
     -----

@@ -57,10 +57,7 @@ _LACKS = re.compile(r"(Unrecognized|Invalid|Unknown) (\w+ ){0,2}style|not enable
 def engine_stop(engine: str, message: str, of_user: bool = False) -> EngineStop:
     """Outcome that fits an error message of LAMMPS or LIGGGHTS, which is quoted.
 
-    Parameters
-    ----------
-    of_user : bool
-        Whether the deck is the user's own, in which a style can be misspelt.
+    ``of_user``: whether the deck is the user's own, in which a style can be misspelt.
     """
     text = " ".join(message.split())
     if _LOST.search(text):
@@ -212,10 +209,7 @@ class SandSession(Session, Protocol):
     def hold_rest(self, why: str) -> None:
         """Let the stage go on while something else than the sand still moves.
 
-        Parameters
-        ----------
-        why : str
-            What has moved since the last check.
+        ``why``: what has moved since the last check.
         """
 
     def vertex_loads(self, name: str) -> Array | None:

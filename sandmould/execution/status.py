@@ -121,11 +121,6 @@ def run_statuses(
     """Where each run stands, by its name; the fills that runs share come first.
 
     A fill that no run waits for any more counts where it was computed.
-
-    Parameters
-    ----------
-    lacks : mapping of str to Lack
-        See ``Plan.lacks``.
     """
     folder = results / plan.study.name
     fills = [
@@ -142,10 +137,7 @@ def run_statuses(
 def status_text(plan: Plan, results: Path, cores: int, deep: bool = False) -> str:
     """Say where a study stands: done, running, failed, time left, cost so far.
 
-    Parameters
-    ----------
-    deep : bool
-        Whether all files of runs that are done or failed are compared with their hashes.
+    ``deep``: whether all files of runs that are done or failed are compared with their hashes.
     """
     folder = results / plan.study.name
     lacks, live = plan.lacks(results), live_jobs()

@@ -66,12 +66,7 @@ def optimum_headline(
 ) -> tuple[str, bool]:
     """Say in one sentence where the optimum of a refined study lies.
 
-    Parameters
-    ----------
-    robustness : RobustnessPages, optional
-        Its controls.
-    has_speed : bool
-        Whether the study gives the wave speed of the real sand.
+    ``has_speed``: whether the study gives the wave speed of the real sand.
     """
     optimum, advised = pages.optimum, pages.recommendation
     if optimum is None:
@@ -155,10 +150,7 @@ def optimum_choice(
 ) -> tuple[KeyNumber, ...]:
     """The optimum between the settings, in words of the machine; nothing where it is not to be set.
 
-    Parameters
-    ----------
-    is_artefact : bool
-        Whether its controls show it to be none of the sand's.
+    ``is_artefact``: whether its controls show it to be none of the sand's.
     """
     optimum, advised = pages.optimum, pages.recommendation
     if optimum is None or is_artefact or (advised is not None and advised.interval_hz is None):

@@ -52,13 +52,7 @@ def bending_pages(
     verdict: Verdict,
     pictured_run: str,
 ) -> dict[str, Any]:
-    """Draw what ``bending.html`` shows of a study's pattern.
-
-    Parameters
-    ----------
-    href : str
-        Address of that folder, seen from the report.
-    """
+    """Draw what ``bending.html`` shows of a study's pattern."""
     verdicts: dict[str, LoopVerdict] = {}
     for run in collected.summary[RUN]:
         loop_verdict = verdict_of(study_folder / "runs" / str(run))

@@ -24,10 +24,7 @@ _COLUMNS = (DISPLACEMENT, VELOCITY, ACCELERATION)
 def drive_of(scenario: Scenario, runs: pd.DataFrame) -> BoxDrive | None:
     """Drive of the first vibration of a setting; None where there is none, or none was measured.
 
-    Parameters
-    ----------
-    runs : DataFrame
-        Rows of the summary at the setting: a table on mounts moves as it was measured.
+    ``runs``: rows of the summary at the setting: a table on mounts moves as it was measured.
     """
     if not scenario.vibrations:
         return None

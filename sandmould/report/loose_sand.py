@@ -26,10 +26,7 @@ def loose_sand_pages(
 ) -> dict[str, Any] | None:
     """Say and draw where sand lies loose in a run; None where that is not sought.
 
-    Parameters
-    ----------
-    scenario : Scenario
-        Its grains are the measure of a zone.
+    ``scenario``: its grains are the measure of a zone.
     """
     if not run or not seeks_loose_sand(scenario):
         return None

@@ -55,10 +55,7 @@ class Row:
 def sand_method(scenario: Scenario, keys: Sequence[str], summary: pd.DataFrame) -> tuple[Row, ...]:
     """How the runs were computed: model, laws, vibration, time step, seeds.
 
-    Parameters
-    ----------
-    scenario : Scenario
-        Of one run; what the study sweeps is said apart.
+    ``scenario``: of one run; what the study sweeps is said apart.
     """
     sand, contact = scenario.sand, scenario.laws
     hardness = bed_hardness(scenario)
@@ -103,15 +100,7 @@ def deck_method(scenario: OwnDeck, keys: Sequence[str], summary: pd.DataFrame) -
 
 
 def statistics_method(objective: Objective, ends: str, draws_by_lot: bool) -> Row:
-    """How the verdict was reached.
-
-    Parameters
-    ----------
-    ends : str
-        When measures are taken.
-    draws_by_lot : bool
-        Whether runs of one setting differ by their seeds.
-    """
+    """How the verdict was reached."""
     compared = f"{name_of(objective.measure)} at {ends}, {objective.better} is better"
     if not draws_by_lot:
         return Row("Statistics", f"{compared}. Nothing is drawn by lot, so a setting is one run.")
@@ -298,10 +287,7 @@ def _seeds(summary: pd.DataFrame) -> str:
 def provenance_rows(all_runs: Sequence[Mapping[str, Any]]) -> tuple[Row, ...]:
     """What the runs say of their origin; what is another one in every run tells nothing of them.
 
-    Parameters
-    ----------
-    all_runs : sequence of mapping
-        The origin of each run, of its ``products.json``.
+    ``all_runs``: the origin of each run, of its ``products.json``.
     """
     flat = [dict(_flatten(p)) for p in all_runs if p]
     rows = []

@@ -163,10 +163,7 @@ def _total(summary: pd.DataFrame, column: str, how: str) -> float | None:
 def settings_table(verdict: Verdict, drives: Mapping[str, BoxDrive]) -> Table:
     """Every setting with its mean, and the best against it.
 
-    Parameters
-    ----------
-    drives : mapping of str to BoxDrive
-        That of the vibrating table at a setting, by label.
+    ``drives``: that of the vibrating table at a setting, by label.
     """
     drive = ("amplitude, mm", "velocity, mm/s", "accel., g") if drives else ()
     columns = (
@@ -249,13 +246,7 @@ _COST = (
 def runs_table(
     summary: pd.DataFrame, keys: Sequence[str], verdict: Verdict, runs_href: str
 ) -> Table:
-    """Every run with its parameters, outcome, objective and cost; why one is left out is said.
-
-    Parameters
-    ----------
-    runs_href : str
-        Address of the folder of runs, seen from the report.
-    """
+    """Every run with its parameters, outcome, objective and cost; why one is left out is said."""
     cost = [c for c in _COST if c[0] in summary]
     blocks = [c for c in (REPLICATE, SEED) if c in summary]
     has_value = verdict.measure in summary

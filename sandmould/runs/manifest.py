@@ -33,10 +33,7 @@ Step = Literal["computed", "measured"]
 def files_below(folder: Path, names: tuple[str, ...] | None = None) -> dict[str, int]:
     """Size of every file, in bytes, by its path from the folder.
 
-    Parameters
-    ----------
-    names : tuple of str, optional
-        Files and folders that count; all unless given.
+    ``names``: files and folders that count; all unless given.
     """
     places = folder.iterdir() if names is None else (folder / name for name in names)
     return {

@@ -125,10 +125,7 @@ def critical_step(
 ) -> CriticalStep:
     """Critical time step of a scene, set by its smallest grains.
 
-    Parameters
-    ----------
-    time_step : TimeStep
-        Its rotational inertia counts.
+    ``time_step``: its rotational inertia counts.
 
     Notes
     -----

@@ -34,15 +34,7 @@ class Passage:
 
 
 def passage_of(curves: pd.DataFrame, runs: Iterable[str], measure: str) -> Passage | None:
-    """A measure of some runs over their vibration; None where no run tells.
-
-    Parameters
-    ----------
-    curves : DataFrame
-        One row a snapshot.
-    runs : iterable of str
-        Names of runs that count.
-    """
+    """A measure of some runs over their vibration; None where no run tells."""
     shaken = _shaken(curves, runs, measure)
     passages = []
     for _, run in shaken.groupby(RUN):

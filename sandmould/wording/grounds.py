@@ -49,14 +49,7 @@ def sand_grounds(
 ) -> tuple[Note, ...]:
     """Say how sure the answer of a study of sand is.
 
-    Parameters
-    ----------
-    scenario : Scenario
-        Of the run that is shown.
-    by_setting : mapping of str to Scenario
-        By label of the setting.
-    of_grains : sequence of str
-        What runs with coarser grains say; empty where there are none.
+    ``of_grains``: what runs with coarser grains say; empty where there are none.
     """
     vibrations = scenario.vibrations
     return scatter_grounds(verdict, "random fillings", study.seeks_best) + notes(

@@ -161,13 +161,7 @@ def _finer(answer: Answer) -> list[NextStep]:
 def optimum_steps(
     study: Study, optimum: Optimum | None, robustness: Robustness | None
 ) -> list[NextStep]:
-    """What an optimum and its controls ask for.
-
-    Parameters
-    ----------
-    optimum : Optimum, optional
-        None where too few runs tell it.
-    """
+    """What an optimum and its controls ask for."""
     if optimum is None:
         return [step("settings")]
     steps = []

@@ -74,10 +74,7 @@ def render_deck(
 ) -> Deck:
     """Render a scenario's deck.
 
-    Parameters
-    ----------
-    sources : mapping of str to str
-        Source of each key's value; shown on the value's line.
+    ``sources``: source of each key's value; shown on the value's line.
     """
 
     def context_of(program: Program) -> dict[str, Any]:

@@ -46,10 +46,7 @@ class BendingMesh:
 
         So force is kept, and moment but for where on its side a grain lies.
 
-        Parameters
-        ----------
-        begins_check : bool
-            Whether samples up to now belong to an earlier check.
+        ``begins_check``: whether samples up to now belong to an earlier check.
         """
         if begins_check:
             self.sums_n, self.samples = np.zeros_like(self.sums_n), 0
@@ -66,10 +63,7 @@ class BendingMesh:
     def exchange(self, walls: str, path: Path) -> str:
         """Commands that put a mesh file in the place of this mesh.
 
-        Parameters
-        ----------
-        walls : str
-            The deck's block, which has the commands of the mesh as drawn.
+        ``walls``: the deck's block, which has the commands of the mesh as drawn.
         """
         lines = walls.splitlines()
         starts = (f"fix surface_{self.name} ", "fix walls ")

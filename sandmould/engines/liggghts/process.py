@@ -74,10 +74,7 @@ class Conversation:
     def __init__(self, path: str, folder: Path, log: Path) -> None:
         """Start LIGGGHTS.
 
-        Parameters
-        ----------
-        folder : Path
-            Working folder, so that a deck's relative names hold.
+        ``folder``: working folder, so that a deck's relative names hold.
         """
         self._screen, theirs = pty.openpty()
         _keep_line_ends(theirs)

@@ -31,10 +31,7 @@ class Submission:
     def __init__(self, plan: Plan, cluster: Cluster | None) -> None:
         """Ask the cluster nothing yet.
 
-        Parameters
-        ----------
-        cluster : Cluster or None
-            None where jobs are of this machine.
+        ``cluster``: None where jobs are of this machine.
         """
         self._plan = plan
         self._cluster = cluster or Cluster()

@@ -82,10 +82,7 @@ class SoFar:
 def so_far_text(summary: pd.DataFrame, study: Study, settings: int) -> str:
     """What some of a study's runs say of its objective, in one sentence; empty without a value.
 
-    Parameters
-    ----------
-    settings : int
-        That are planned: before each has a value, none is called the best.
+    ``settings``: how many are planned: before each has a value, none is called the best.
     """
     measure, better = study.objective.measure, study.objective.better
     swept = sweep_part(summary)

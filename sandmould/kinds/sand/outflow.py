@@ -162,10 +162,7 @@ def outflow_time_s(table: pd.DataFrame) -> float:
 def side_load_fraction(loads: pd.DataFrame) -> float:
     """Horizontal forces of the filled sand on all that holds it over its weight on the floors.
 
-    Parameters
-    ----------
-    loads : DataFrame
-        ``loads.tsv`` of a run; the last window before the gate opens is taken.
+    ``loads``: ``loads.tsv`` of a run; the last window before the gate opens is taken.
     """
     filled = loads[loads["stage"].map(is_filling).astype(bool)]
     last = filled[filled["time_s"] == filled["time_s"].max()]

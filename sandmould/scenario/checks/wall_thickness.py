@@ -37,10 +37,7 @@ class ThinWall:
 def thinnest_wall(bodies: Sequence[Body], below_m: float) -> ThinWall | None:
     """Find walls thinner than a limit; None where none is.
 
-    Parameters
-    ----------
-    bodies : sequence of Body
-        Parts that touch are one.
+    ``bodies``: parts that touch are one.
     """
     samples = [_surface(body, below_m) for body in bodies]
     place, normal, area = (np.concatenate(parts) for parts in zip(*samples, strict=True))

@@ -29,10 +29,7 @@ class Labels:
 def run_label(parameters: Point, scenario: type[Section], has_units: bool) -> str:
     """Names and values of at most three swept keys, in letters that any file system takes.
 
-    Parameters
-    ----------
-    has_units : bool
-        Whether the unit stands in the label.
+    ``has_units``: whether the unit stands in the label.
     """
     keys = sorted(parameters)
     last = [key.rsplit(".", 1)[-1] for key in keys]

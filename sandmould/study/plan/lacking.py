@@ -55,10 +55,8 @@ def lack_of(run: Run, folder: Path, template_hash: Callable[[Run], str] | None =
 
     A failed run lacks nothing: it has its outcome, and only ``sandmould again`` forgets that.
 
-    Parameters
-    ----------
-    template_hash : callable, optional
-        Hash of what turns a run into its deck, for a caller that keeps it; see ``Planning``.
+    ``template_hash``: hash of what turns a run into its deck, for a caller that keeps it; see
+    ``Planning``.
     """
     wanted = template_hash or _template_hash
     try:

@@ -26,13 +26,7 @@ def measured_in(study: Study, kind: Kind[Any], scenario: AnyScenario) -> list[Me
 
 
 def problems(study: Study, kind: Kind[Any], scenario: AnyScenario) -> Iterator[Problem]:
-    """List the measures asked for that a scene of a study will not have.
-
-    Parameters
-    ----------
-    scenario : scenario of any kind
-        At one point of the sweep.
-    """
+    """List the measures asked for that a scene of a study will not have."""
     has = [measure.name for measure in measured_in(study, kind, scenario) if measure.is_number]
     yield from own_measures.problems_in_scene(
         study.own_measures, has[: len(has) - len(study.own_measures)]

@@ -32,10 +32,7 @@ class Contenders:
     def more(self, runs: int) -> tuple[tuple[Point, int], ...]:
         """Bring the contenders to equally many replicates; where they are, to one more.
 
-        Parameters
-        ----------
-        runs : int
-            Most that are added; the nearest to the best come first.
+        ``runs``: the most that are added; the nearest to the best come first.
         """
         fewest, most = min(self.replicates), max(self.replicates)
         goal = most if fewest < most else most + 1
@@ -53,10 +50,7 @@ def find_contenders(summary: pd.DataFrame, study: Study, keys: list[str]) -> Con
     Settings are compared as in the report, so that one that gets no more runs is one that the
     report calls worse.
 
-    Parameters
-    ----------
-    summary : DataFrame
-        One row a run of the sweep and of all rounds so far.
+    ``summary``: one row a run of the sweep and of all rounds so far.
     """
     objective = study.objective
     verdict = compare_settings(summary, keys, objective.measure, objective.better)
@@ -88,13 +82,7 @@ def best_points(summary: pd.DataFrame, study: Study, keys: list[str]) -> tuple[P
 
 
 def why_decided(contenders: Contenders, half_width: float | None) -> str:
-    """Say why no more replicates are due; empty where they are.
-
-    Parameters
-    ----------
-    half_width : float, optional
-        That is small enough.
-    """
+    """Say why no more replicates are due; empty where they are."""
     if len(contenders.points) == 1:
         return "One setting is left: all others are ruled out."
     if half_width is not None and contenders.half_width <= half_width:

@@ -17,10 +17,7 @@ _OF_USER = re.compile(r"^[vcf]_\w+$")
 def column_problems(scenario: OwnDeck, deck: str) -> Iterator[Problem]:
     """Tell columns that a rendered deck, by its text alone, will not print.
 
-    Parameters
-    ----------
-    deck : str
-        As the engine reads it at the beginning.
+    ``deck``: as the engine reads it at the beginning.
     """
     printed = _printed(deck)
     if printed is None:
