@@ -71,16 +71,12 @@ class Surface:
 
 
 def lying(position_m: Array, radius_m: Array, floor_m: float) -> NDArray[np.bool_]:
-    """Find the grains that hang together with the floor: those that still fall do not.
+    """Find the grains that hang together with the floor: those that still fall do not, (n,) bool.
 
     Parameters
     ----------
     position_m : (n, d) float64, m
     radius_m : (n,) float64, m
-
-    Returns
-    -------
-    (n,) bool
     """
     from scipy.sparse import coo_array
     from scipy.sparse.csgraph import connected_components

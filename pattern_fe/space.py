@@ -82,15 +82,11 @@ class Space:
         return np.asarray(nodes, dtype=np.int64)
 
     def assembled(self, matrices: Array) -> csc_array:
-        """Sum matrices of elements into one of all nodes.
+        """Sum matrices of elements into one of all nodes, (n d, n d) sparse float64.
 
         Parameters
         ----------
         matrices : (ne, k d, k d) float64
-
-        Returns
-        -------
-        (n d, n d) sparse float64
         """
         d, n = self.dimension, self.node_m.size
         rows = (self.cells[:, :, None] * d + np.arange(d)).reshape(len(self.cells), -1)

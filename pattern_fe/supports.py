@@ -35,11 +35,7 @@ class Supports:
 
 
 def fixed_components(space: Space, supports: Supports) -> Mask:
-    """Components of the displacement that supports keep at zero.
-
-    Returns
-    -------
-    (n, d) bool
+    """Components of the displacement that supports keep at zero, (n, d) bool.
 
     Raises
     ------

@@ -88,15 +88,11 @@ CAVITY_KINDS = {2: ("box", "polygon"), 3: ("box", "cylinder", "mesh")}
 
 
 def inward(cavity: AnyCavity, dimension: int, key: str) -> Array:
-    """Unit vector from the side that a cavity opens to into it.
+    """Unit vector from the side that a cavity opens to into it, (d,) float64.
 
     Parameters
     ----------
     cavity : cavity of any kind
-
-    Returns
-    -------
-    (d,) float64
 
     Raises
     ------
