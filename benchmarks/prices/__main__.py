@@ -32,7 +32,8 @@ from sandmould.kinds.kind import CORE_SECONDS, SpeedClass
 from sandmould.kinds.registry import kind_of
 from sandmould.runs.columns import CPU_S, FILL_CPU_S, RUN, WALL_S, finished, total_s
 from sandmould.study.collect import read_summary
-from sandmould.study.plan.build_plan import Plan, known_prices, measure_speeds, open_plan
+from sandmould.study.plan.announcement import known_prices, measure_speeds
+from sandmould.study.plan.build_plan import Plan, open_plan
 from sandmould.study.plan.fills import own_work, share_fills
 from sandmould.study.plan.load_study import STUDIES, open_study
 from sandmould.study.plan.price import BEGIN_S, END_S, Prices, foretold_s, study_s

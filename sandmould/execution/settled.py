@@ -18,7 +18,8 @@ from sandmould.plain_file import UNREADABLE, read_plain
 from sandmould.runs.claim import CLAIM_FILE
 from sandmould.runs.files import write_text
 from sandmould.runs.manifest import MANIFEST_FILE, OUTCOME_FILE
-from sandmould.study.plan.build_plan import Plan, write_files
+from sandmould.study.plan.announcement import write_files
+from sandmould.study.plan.build_plan import Plan
 from sandmould.study.plan.plan_files import SUMMARY
 
 _FILE = "settled.txt"

@@ -32,7 +32,8 @@ from sandmould.runs.hashing import scenario_hash
 from sandmould.runs.manifest import change, read_manifest
 from sandmould.runs.outcome import Outcome, RunOutcome
 from sandmould.runs.progress import duration_text
-from sandmould.study.plan.build_plan import Plan, stored_speeds
+from sandmould.study.plan.announcement import stored_speeds
+from sandmould.study.plan.build_plan import Plan
 from sandmould.study.plan.lacking import WHOLE, Lack, Need
 from sandmould.study.plan.plan_files import read_run
 from sandmould.study.rounds.round_log import read_rounds

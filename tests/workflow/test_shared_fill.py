@@ -32,7 +32,8 @@ from sandmould.runs.outcome import Outcome, RunOutcome
 from sandmould.runs.run_tables import read_costs
 from sandmould.scenario.scenario import Scenario
 from sandmould.study.collect import collect
-from sandmould.study.plan.build_plan import RESULTS, Plan, open_plan, prepare
+from sandmould.study.plan.announcement import prepare
+from sandmould.study.plan.build_plan import RESULTS, Plan, open_plan
 from sandmould.study.plan.fills import share_fills
 from sandmould.study.plan.lacking import Need, lack_of
 from sandmould.study.plan.plan_files import read_run
