@@ -304,9 +304,7 @@ def test_what_is_lost_of_a_study_is_computed_from_its_fills(sweep: Plan) -> None
     assert f"computed again: {fill.run} ({why})" in prepare(plan, RESULTS)
 
 
-def test_packed_runs_need_no_fill_and_its_cost_travels(
-    sweep: Plan, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_packed_runs_need_no_fill_and_its_cost_travels(sweep: Plan) -> None:
     plan, folder = sweep, RESULTS / "small"
     (fill,), (_, run) = plan.fills, plan.runs
     collect(folder)
