@@ -32,7 +32,6 @@ def own_solid_fraction(position_m: Array, radius_m: Array, scene: Scene, grain_m
     ----------
     position_m : (n, d) float64, m
     radius_m : (n,) float64, m
-    scene : Scene
     grain_m : float, m
         Diameter of the mass-median grain.
 
@@ -73,9 +72,6 @@ def buried_places(
     ----------
     position_m : (n, d) float64, m
     radius_m : (n,) float64, m
-    depth_m : float, m
-    cell_m : float, m
-        Distance of neighbouring places.
     """
     dimension = position_m.shape[1]
     if not len(position_m):

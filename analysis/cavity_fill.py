@@ -68,11 +68,8 @@ def cavity_fill(
     ----------
     position_m : (n, d) float64, m
     radius_m : (n,) float64, m
-    cavity : Cavity
     slab_m : float, m
         Thickness of the slabs; changed so that a whole number of them makes the cavity's length.
-    bed_fraction : float
-        Solid fraction of the bed.
     """
     corners_m = cavity.space.corners()
     reach_m = float(radius_m.max(initial=0.0))
@@ -145,11 +142,6 @@ def cavity_voids(
     ----------
     position_m : (n, d) float64, m
     radius_m : (n,) float64, m
-    cavity : Cavity
-    scene : Scene
-        What stands round the cavity, and in it.
-    grain_m : float, m
-        Diameter of the grain.
     """
     grid = _void_grid(cavity, grain_m)
     reach_m = 0.5 * grain_m * (1.0 - _ROUND_OFF)

@@ -66,7 +66,7 @@ def deflection(drawn_m: Array, now_m: Array, tip: int) -> Deflection:
 
 
 def fill_under(outline_m: Array, position_m: Array, radius_m: Array) -> float:
-    """Share of the space straight under a pattern, down to y = 0, that discs fill.
+    """Share of the space straight under a pattern, down to y = 0, that discs fill; NaN without one.
 
     Discs count whole where their centre lies there: the paper's low density under a flange.
 
@@ -76,11 +76,6 @@ def fill_under(outline_m: Array, position_m: Array, radius_m: Array) -> float:
         Closed, counter-clockwise.
     position_m : (n, 2) float64, m
     radius_m : (n,) float64, m
-
-    Returns
-    -------
-    float
-        NaN for a pattern without space under it.
     """
     left_m, right_m = outline_m[:, 0].min(), outline_m[:, 0].max()
     width_m = (right_m - left_m) / _COLUMNS

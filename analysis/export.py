@@ -25,12 +25,6 @@ def to_vtk(snapshot: Snapshot, path: Path) -> None:
     Each grain is a vertex cell with ``id``, ``layer``, ``radius_m``, ``velocity_m_s``,
     ``spin_rad_s`` and, the same for all, ``time_s`` and ``vibration_time_s``: meshio writes no
     field data, where a time would belong. Points of 2D lie at z = 0.
-
-    Parameters
-    ----------
-    snapshot : Snapshot
-    path : Path
-        Appears only when complete.
     """
     n = len(snapshot.id)
     mesh = meshio.Mesh(
@@ -55,12 +49,6 @@ def solids_to_vtk(scene: Scene, path: Path) -> None:
 
     Each cell has the number of its ``solid``, from 0, in the order of ``Scene.solids``. A round
     solid has 128 sides. Points of 2D lie at z = 0.
-
-    Parameters
-    ----------
-    scene : Scene
-    path : Path
-        Appears only when complete.
     """
     points_m, cells, numbers = [np.zeros((0, 3))], [], []
     for number, solid in enumerate(scene.solids):
@@ -86,12 +74,7 @@ def elements_to_vtk(fields: Mapping[str, Array], path: Path) -> None:
     Elements that touch share corners. Cells have ``frozen_s``, ``temperature_k`` and ``melts`` (1
     in the casting).
 
-    Parameters
-    ----------
-    fields : mapping
-        Arrays ``position_m`` (n, d), ``size_m`` (n,) and those of the cells, (n,).
-    path : Path
-        Appears only when complete.
+    ``fields``: arrays ``position_m`` (n, d), ``size_m`` (n,) and those of the cells, (n,).
     """
     position_m, size_m = fields["position_m"], fields["size_m"]
     dimensions = position_m.shape[1]
@@ -128,12 +111,6 @@ def to_ovito(snapshot: Snapshot, path: Path) -> None:
 
     The type is the layer, so that OVITO colours layers at once. The time step, a whole number, is
     the simulated time in microseconds. The box just holds the grains.
-
-    Parameters
-    ----------
-    snapshot : Snapshot
-    path : Path
-        Appears only when complete.
     """
     position_m, radius_m = _in_space(snapshot.position_m), snapshot.radius_m[:, None]
     low_m = (position_m - radius_m).min(axis=0, initial=np.inf)

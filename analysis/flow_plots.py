@@ -45,21 +45,14 @@ def _in_slice(fields: Mapping[str, Array], place_m: Array) -> NDArray[np.bool_]:
 def draw_frame(
     fields: Mapping[str, Array], frame: Frame, axes: Axes, highest_pa: float
 ) -> EllipseCollection:
-    """Draw mould and metal, particles as circles coloured by pressure.
+    """Draw mould and metal, particles as circles coloured by pressure; for a colour bar.
 
     Parameters
     ----------
     fields : mapping
         Arrays of ``fields.npz``.
-    frame : Frame
-    axes : Axes
     highest_pa : float, Pa
         Upper end of the colours; their lower end is 0.
-
-    Returns
-    -------
-    EllipseCollection
-        What a colour bar shows.
     """
     wall = fields["wall_m"]
     wall = wall[_in_slice(fields, wall)][:, [0, -1]]

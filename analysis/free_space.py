@@ -62,8 +62,6 @@ def free_part(position_m: Array, radius_m: Array, scene: Scene) -> Array:
     ----------
     position_m : (n, d) float64, m
     radius_m : (n,) float64, m
-    scene : Scene
-        In 3D every wall must be upright or level.
 
     Returns
     -------
@@ -100,7 +98,6 @@ def part_in_solid(
     ----------
     position_m : (n, d) float64, m
     radius_m : (n,) float64, m
-    solid : Solid
     walls : tuple of Wall, optional
         What of a 2D solid or an upright block lies behind them does not count.
 
@@ -126,8 +123,6 @@ def free_measure_between(scene: Scene, edges_m: Array) -> Array:
 
     Parameters
     ----------
-    scene : Scene
-        Its walls must close the box on every side; in 3D they must be upright or level.
     edges_m : (m + 1,) float64, m
         Rising heights.
 
@@ -163,17 +158,12 @@ def _meshes(scene: Scene) -> tuple[TriangleMesh, ...]:
 
 
 def box_section(scene: Scene, low_m: float = 0.0, high_m: float = 0.0) -> Array:
-    """Polygon of the box: between two heights in 2D, in plan in 3D.
+    """Polygon of the box: between two heights in 2D, in plan in 3D, (k, 2) float64, m.
 
     Parameters
     ----------
-    scene : Scene
     low_m, high_m : float, m
         Heights that bound the polygon in 2D; not used in 3D.
-
-    Returns
-    -------
-    (k, 2) float64, m
 
     Raises
     ------
@@ -271,16 +261,12 @@ def _block_prism(block: Block, walls: tuple[Wall, ...]) -> _Prism:
 
 
 def polygon_below_m2(polygon_m: Array, height_m: Array) -> Array:
-    """Area of a polygon under each height.
+    """Area of a polygon under each height, (m,) float64, m2.
 
     Parameters
     ----------
     polygon_m : (k, 2) float64, m
     height_m : (m,) float64, m
-
-    Returns
-    -------
-    (m,) float64, m2
     """
     down = np.array([0.0, -1.0])
     cut = [cut_polygon(polygon_m, np.array([0.0, h]), down) for h in height_m]

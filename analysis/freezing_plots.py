@@ -27,14 +27,7 @@ def draw_freezing(
 ) -> None:
     """Draw freezing times over the casting with hot spots and the last point to freeze.
 
-    Parameters
-    ----------
-    fields : mapping
-        Arrays of ``fields.npz``.
-    freezing : Freezing
-    axes : Axes
-    distance_m : callable, optional
-        From the surface of what is cast, whose outline is then drawn.
+    ``distance_m``: from the surface of what is cast, whose outline is then drawn.
     """
     cut, axis, at_m = _cut(fields, freezing)
     melts = cut["melts"].astype(bool)
@@ -92,9 +85,6 @@ def draw_part(low_m: Array, high_m: Array, at_m: float, axes: Axes, distance_m: 
         Corners of the box.
     at_m : float, m
         In 3D, y of the plane of x and z.
-    axes : Axes
-    distance_m : callable
-        As in :func:`draw_freezing`.
     """
     axis = 1 if len(low_m) == 3 else 2
     kept = [each for each in range(len(low_m)) if each != axis]

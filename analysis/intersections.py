@@ -51,7 +51,7 @@ def sphere_cap_m3(distance_m: Array, radius_m: Array) -> Array:
 
 
 def disc_lens_m2(distance_m: Array, first_radius_m: Array, second_radius_m: Array) -> Array:
-    """Area common to two discs, also when apart or one inside the other.
+    """Area common to two discs, also when apart or one inside the other, (n,) float64, m2.
 
     The line of equal power cuts both discs along their common chord, so the lens is a segment of
     each.
@@ -61,27 +61,19 @@ def disc_lens_m2(distance_m: Array, first_radius_m: Array, second_radius_m: Arra
     distance_m : (n,) float64, m
         Between the centres.
     first_radius_m, second_radius_m : (n,) float64, m
-
-    Returns
-    -------
-    (n,) float64, m2
     """
     first, second = _to_common_chord(distance_m, first_radius_m, second_radius_m)
     return disc_segment_m2(first, first_radius_m) + disc_segment_m2(second, second_radius_m)
 
 
 def sphere_lens_m3(distance_m: Array, first_radius_m: Array, second_radius_m: Array) -> Array:
-    """Volume common to two spheres, also when apart or one inside the other.
+    """Volume common to two spheres, also when apart or one inside the other, (n,) float64, m3.
 
     Parameters
     ----------
     distance_m : (n,) float64, m
         Between the centres.
     first_radius_m, second_radius_m : (n,) float64, m
-
-    Returns
-    -------
-    (n,) float64, m3
     """
     first, second = _to_common_chord(distance_m, first_radius_m, second_radius_m)
     return sphere_cap_m3(first, first_radius_m) + sphere_cap_m3(second, second_radius_m)
@@ -158,7 +150,7 @@ def depth_in_polygon_m(point_m: Array, polygon_m: Array) -> Array:
 
 
 def disc_polygon_m2(centre_m: Array, radius_m: Array, polygon_m: Array) -> Array:
-    """Area common to discs and one convex polygon, exact.
+    """Area common to discs and one convex polygon, exact, (n,) float64, m2.
 
     Green's theorem: each edge, seen from the disc's centre at distance d, adds the triangle under
     its chord and the sectors beside it. A half-infinite region is given as a polygon that reaches
@@ -170,10 +162,6 @@ def disc_polygon_m2(centre_m: Array, radius_m: Array, polygon_m: Array) -> Array
     radius_m : (n,) float64, m
     polygon_m : (k, 2) float64, m
         In either sense of rotation; an empty one has no area.
-
-    Returns
-    -------
-    (n,) float64, m2
     """
     area = np.zeros(len(centre_m))
     if len(polygon_m) < 3:
@@ -190,7 +178,7 @@ def disc_polygon_m2(centre_m: Array, radius_m: Array, polygon_m: Array) -> Array
 
 
 def disc_outline_m2(centre_m: Array, radius_m: Array, polygon_m: Array) -> Array:
-    """Area common to discs and one polygon that need not be convex, exact.
+    """Area common to discs and one polygon that need not be convex, exact, (n,) float64, m2.
 
     Parameters
     ----------
@@ -199,10 +187,6 @@ def disc_outline_m2(centre_m: Array, radius_m: Array, polygon_m: Array) -> Array
     polygon_m : (k, 2) float64, m
         In either sense of rotation; edges may run back along one another, as where
         :func:`cut_polygon` has parted it.
-
-    Returns
-    -------
-    (n,) float64, m2
     """
     area = np.zeros(len(centre_m))
     if len(polygon_m) < 3:
@@ -254,7 +238,7 @@ def _green_m2(centre_m: Array, radius_m: Array, start_m: Array, along: Array) ->
 def sphere_prism_m3(
     centre_m: Array, radius_m: Array, polygon_m: Array, low_m: float, high_m: float
 ) -> Array:
-    """Volume common to spheres and a convex prism along the third axis.
+    """Volume common to spheres and a convex prism along the third axis, (n,) float64, m3.
 
     Spheres wholly inside, wholly outside or cut by one face only are exact. The others are
     integrated over slices (disc and polygon, exact) by Gauss-Legendre quadrature between the
@@ -269,10 +253,6 @@ def sphere_prism_m3(
         Convex section in the plane of the first two axes.
     low_m, high_m : float, m
         Ends of the prism on the third axis.
-
-    Returns
-    -------
-    (n,) float64, m3
     """
     volume = np.zeros(len(centre_m))
     if len(polygon_m) < 3 or high_m <= low_m:

@@ -28,7 +28,6 @@ def sphere_mesh_m3(centre_m: Array, radius_m: Array, mesh: TriangleMesh) -> Arra
     ----------
     centre_m : (n, 3) float64, m
     radius_m : (n,) float64, m
-    mesh : TriangleMesh
 
     Returns
     -------
@@ -102,19 +101,14 @@ def _lean(along_m: Array, depth_m: Array, height_m: Array) -> Array:
 
 
 def mesh_below_m3(mesh: TriangleMesh, height_m: Array) -> Array:
-    """Volume of a closed mesh under each height, exact.
+    """Volume of a closed mesh under each height, exact, (m,) float64, m3.
 
     By the divergence theorem it is the sum, over the triangles' parts below the height, of the
     integral of the depth under it times the slope of the triangle.
 
     Parameters
     ----------
-    mesh : TriangleMesh
     height_m : (m,) float64, m
-
-    Returns
-    -------
-    (m,) float64, m3
     """
     corners_m = mesh.corners_m
     # twice the area seen from above, negative for a triangle that faces down

@@ -50,9 +50,6 @@ def scene_section(scene: Scene, height_m: float, cut_m: float | None = None) -> 
 
     Parameters
     ----------
-    scene : Scene
-    height_m : float, m
-        Up to which the box is shown.
     cut_m : float, m, optional
         In 3D, y of the plane shown; the middle of the box unless given.
 
@@ -78,15 +75,6 @@ def scene_section(scene: Scene, height_m: float, cut_m: float | None = None) -> 
 
 def draw_scene(scene: Scene, ax: Axes, height_m: float, cut_m: float | None = None) -> Axes:
     """Draw the box, open at the top, its solids, and bores and cavities as broken lines.
-
-    Parameters
-    ----------
-    scene : Scene
-    ax : Axes
-    height_m : float, m
-        Up to which the box is shown.
-    cut_m : float, m, optional
-        In 3D, y of the plane shown; the middle of the box unless given.
 
     Raises
     ------
@@ -118,11 +106,8 @@ def draw_grains(
 
     Parameters
     ----------
-    snapshot : Snapshot
-    ax : Axes
     values : (n,) float64, optional
         What colours the grains; NaN is grey, and without values all are the colour of sand.
-    cmap : str, optional
     limits : (float, float), optional
         Values at the ends of the colour map; the smallest and largest unless given.
     cut_m : float, m, optional
@@ -141,15 +126,7 @@ def draw_grains(
 
 
 def draw_by_layer(snapshot: Snapshot, ax: Axes, cut_m: float | None = None) -> Axes:
-    """Draw the grains in the colour of the layer of fill that brought them, with a key.
-
-    Parameters
-    ----------
-    snapshot : Snapshot
-    ax : Axes
-    cut_m : float, m, optional
-        As in :func:`draw_grains`.
-    """
+    """Draw the grains in the colour of the layer of fill that brought them, with a key."""
     grains, in_plane = _collection(snapshot, ax, cut_m)
     colours = _colour_of(snapshot.layer[in_plane]).tolist()
     grains.set_facecolor([LAYER_COLOURS[colour] for colour in colours])

@@ -27,14 +27,6 @@ def reached_share(cavity: Cavity, scene: Scene, grain_m: float) -> float:
 
     It lacks sharp edges, gaps narrower than the grain, and what lies behind them. A gap that is
     narrower by less than a cell's diagonal, 9 % of the grain in 2D and 22 % in 3D, may pass.
-
-    Parameters
-    ----------
-    cavity : Cavity
-    scene : Scene
-        What stands round the cavity, and in it.
-    grain_m : float, m
-        Diameter of the grain.
     """
     known = _KNOWN.setdefault(cavity, {})
     if grain_m not in known:

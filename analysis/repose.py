@@ -71,18 +71,12 @@ class Surface:
 
 
 def lying(position_m: Array, radius_m: Array, floor_m: float) -> NDArray[np.bool_]:
-    """Find the grains that hang together with the floor: those that still fall do not.
+    """Find the grains that hang together with the floor: those that still fall do not, (n,) bool.
 
     Parameters
     ----------
     position_m : (n, d) float64, m
     radius_m : (n,) float64, m
-    floor_m : float, m
-        Height of the floor.
-
-    Returns
-    -------
-    (n,) bool
     """
     from scipy.sparse import coo_array
     from scipy.sparse.csgraph import connected_components
@@ -148,7 +142,6 @@ def profiles(surface: Surface, width_m: float, axis_m: Array) -> dict[str, tuple
 
     Parameters
     ----------
-    surface : Surface
     width_m : float, m
         Of the columns or rings that the surface is averaged over: about one of the largest grains.
     axis_m : (d - 1,) float64, m
@@ -188,11 +181,9 @@ def fit_flank(name: str, distance_m: Array, height_m: Array, foot: float = FOOT)
 
     Parameters
     ----------
-    name : str
     distance_m, height_m : (k,) float64, m
         Profile from foot to crest; only heights between ``foot`` and ``CREST`` of its largest,
         from the last point below that range on, are fitted.
-    foot : float
     """
     crest_m = float(height_m.max(initial=0.0))
     top = int(np.argmax(height_m >= CREST * crest_m)) if len(height_m) else 0
@@ -233,9 +224,6 @@ def heap_slope(surface: Surface, width_m: float, axis_m: Array) -> Slope:
 
     Parameters
     ----------
-    surface : Surface
-    width_m : float, m
-        As in ``profiles``.
     axis_m : (d - 1,) float64, m
         Where the sand fell; in 2D the crest beside it is looked for.
     """
@@ -259,7 +247,6 @@ def walls_touched(surface: Surface, low_m: Array, high_m: Array, depth_m: float)
 
     Parameters
     ----------
-    surface : Surface
     low_m, high_m : (d - 1,) float64, m
         Where the walls are.
     depth_m : float, m

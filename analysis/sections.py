@@ -14,7 +14,6 @@ def solid_sections(solid: Solid, cut_m: float) -> list[Array]:
 
     Parameters
     ----------
-    solid : Solid
     cut_m : float, m
         In 3D, y of the plane of x and z; of no meaning in 2D.
 
@@ -38,8 +37,6 @@ def convex_section(corners_m: Array, cut_m: float) -> Array:
     Parameters
     ----------
     corners_m : (m, d) float64, m
-    cut_m : float, m
-        In 3D, y of the plane of x and z; of no meaning in 2D.
 
     Returns
     -------

@@ -44,8 +44,6 @@ def solid_fraction_profile(
     ----------
     position_m : (n, d) float64, m
     radius_m : (n,) float64, m
-    scene : Scene
-        Its walls must close the box on every side; in 3D they must be upright or level.
     edges_m : (m + 1,) float64, m
         Rising heights.
 
@@ -74,13 +72,6 @@ def mean_solid_fraction(
     ----------
     position_m : (n, d) float64, m
     radius_m : (n,) float64, m
-    scene : Scene
-    low_m, high_m : float, m
-
-    Raises
-    ------
-    ValueError
-        As :func:`solid_fraction_profile`.
     """
     edges_m = np.array([low_m, high_m])
     profile = solid_fraction_profile(position_m, radius_m, scene, edges_m)
@@ -102,8 +93,6 @@ def bed_surface_height_m(
     ----------
     position_m : (n, d) float64, m
     radius_m : (n,) float64, m
-    scene : Scene
-        Its walls must close the box on every side; in 3D they must be upright or level.
     column_width_m : float, m, optional
         Four times the largest radius unless given; stretched to a whole number of columns.
 

@@ -20,7 +20,6 @@ def transfer(
     time_s : (n,) float64, s
         Ends of the windows over which the force is a mean.
     force_n : (n,) float64, N
-    frequency_hz, window_s : float
     rigid_n : float, N
         Mass of the bed times the amplitude of its box's acceleration.
 

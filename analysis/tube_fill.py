@@ -42,7 +42,6 @@ def tube_fill(
     ----------
     position_m : (n, d) float64, m
     radius_m : (n,) float64, m
-    bore : Bore
     depth_edges_m : (m + 1,) float64, m, optional
         Rising depths behind the mouth, for a profile.
     """
@@ -72,7 +71,6 @@ def sand_in_bore(position_m: Array, radius_m: Array, bore: Bore) -> Array:
     ----------
     position_m : (n, d) float64, m
     radius_m : (n,) float64, m
-    bore : Bore
 
     Returns
     -------

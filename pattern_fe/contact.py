@@ -51,24 +51,17 @@ def touch(
     response: Response,
     pressed: NDArray[np.bool_] | None = None,
 ) -> Touch | None:
-    """Find the reactions that keep a motion out of what surrounds a pattern.
+    """Find the reactions that keep a motion out of what surrounds a pattern; None where none press.
 
     Parameters
     ----------
-    surroundings : Surroundings
     at_m : (nv, d) float64, m
         Displacement from which the motion leads; gaps are linearised there.
     free_m : (nv, d) float64, m
         Displacement that it leads to without reactions.
-    response : Response
     pressed : (nv,) bool, optional
         Vertices with reactions before, whose closed gaps are taken to stay closed unless they are
         found to pull: a pattern that only its contacts keep from buckling has no stiffness without.
-
-    Returns
-    -------
-    Touch or None
-        None where nothing presses.
 
     Raises
     ------
@@ -156,7 +149,7 @@ def _deepest(gaps: Gaps, open_m: Array, least_m: float) -> Indices:
 
 
 def reactions_n(compliance_m_n: Array, open_m: Array) -> Array:
-    """Solve r >= 0, w = C r + g >= 0, r w = 0.
+    """Solve r >= 0, w = C r + g >= 0, r w = 0, (m,) float64, N.
 
     Parameters
     ----------
@@ -164,10 +157,6 @@ def reactions_n(compliance_m_n: Array, open_m: Array) -> Array:
         C, symmetric and positive; rows of places that cannot move are 0 and get no reaction.
     open_m : (m,) float64, m
         g, gaps without reactions.
-
-    Returns
-    -------
-    (m,) float64, N
 
     Raises
     ------

@@ -27,11 +27,6 @@ def distance_from_drawing(drawn: Perimeter, deformed: Perimeter) -> Distance:
     """Measure from each vertex of the deformed surface to the nearest point of the drawn one.
 
     What slides along itself has no distance.
-
-    Parameters
-    ----------
-    drawn, deformed : Perimeter
-        Of the same pattern.
     """
     place_m = deformed.vertices_m
     if drawn.loops:

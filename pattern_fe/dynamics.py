@@ -45,7 +45,6 @@ def natural_frequencies_hz(
     ----------
     stiffness, mass : (n d, n d) sparse float64, N/m and kg
     fixed : (n, d) bool
-    count : int
 
     Returns
     -------

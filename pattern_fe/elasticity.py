@@ -18,15 +18,11 @@ Array = NDArray[np.float64]
 
 
 def displacement_gradient(space: Space, displacement_m: Array) -> Array:
-    """Grad u at the integration points; F = 1 + grad u.
+    """Grad u at the integration points; F = 1 + grad u, (ne, q, d, d) float64.
 
     Parameters
     ----------
     displacement_m : (n, d) float64, m
-
-    Returns
-    -------
-    (ne, q, d, d) float64
     """
     moved = displacement_m[space.cells].transpose(0, 2, 1)[:, None]
     return np.asarray(moved @ space.gradient)
@@ -43,15 +39,11 @@ def green_strain(slope: Array) -> Array:
 
 
 def internal_force_n(space: Space, foam: Foam, displacement_m: Array) -> Array:
-    """Forces with which the nodes must be held in a deformed state.
+    """Forces with which the nodes must be held in a deformed state, (n, d) float64, N.
 
     Parameters
     ----------
     displacement_m : (n, d) float64, m
-
-    Returns
-    -------
-    (n, d) float64, N
     """
     moved = np.ascontiguousarray(displacement_m, dtype=np.float64)
     lam, mu = foam.lame_pa
@@ -59,16 +51,12 @@ def internal_force_n(space: Space, foam: Foam, displacement_m: Array) -> Array:
 
 
 def element_tangent_n_m(space: Space, foam: Foam, displacement_m: Array) -> Array:
-    """Change of the elements' forces with their displacements.
+    """Change of the elements' forces with their displacements, (ne, k d, k d) float64, N/m.
 
     Parameters
     ----------
     displacement_m : (n, d) float64, m
         State about which they change.
-
-    Returns
-    -------
-    (ne, k d, k d) float64, N/m
     """
     lam, mu = foam.lame_pa
     ne, _, k, d = space.gradient.shape

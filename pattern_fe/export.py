@@ -30,7 +30,6 @@ def write_surface(
 
     Parameters
     ----------
-    path : Path
     perimeter : Perimeter
         As drawn.
     displacement_m, load_n : (nv, d) float64, m and N
@@ -57,8 +56,6 @@ def write_solid(
 
     Parameters
     ----------
-    path : Path
-    space : Space
     displacement_m : (n, d) float64, m
         Of all nodes.
     of_elements : mapping of name to (ne,) float64
@@ -77,8 +74,6 @@ def write_stl(path: Path, space: Space, perimeter: Perimeter, displacement_m: Ar
 
     Parameters
     ----------
-    path : Path
-    space : Space
     perimeter : Perimeter
         As drawn.
     displacement_m : (n, d) float64, m

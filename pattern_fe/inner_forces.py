@@ -67,7 +67,7 @@ _BY_DIMENSION = {2: _compiled(2), 3: _compiled(3)}
 def inner_forces(
     cells: Indices, gradient: Array, weight: Array, displacement: Array, lam: float, mu: float
 ) -> Array:
-    """Sum the integrals of P grad N over elements, P = F (lam tr(E) 1 + 2 mu E).
+    """Sum the integrals of P grad N over elements, P = F (lam tr(E) 1 + 2 mu E), (n, d) float64, N.
 
     Parameters
     ----------
@@ -76,10 +76,6 @@ def inner_forces(
     weight : (ne, q) float64, m3
     displacement : (n, d) float64, m
     lam, mu : float, Pa
-
-    Returns
-    -------
-    (n, d) float64, N
     """
     compiled = _BY_DIMENSION[gradient.shape[3]]
     return compiled(cells, gradient, weight, displacement, lam, mu)

@@ -180,13 +180,10 @@ def solve_large(
 
     Parameters
     ----------
-    space : Space
-    foam : Foam
     bedding : (n d, n d) sparse float64, N/m
         Springs.
     fixed : (n, d) bool
     load_n : (n, d) float64, N
-    settings : NewtonSettings
     motion : (nv, n) sparse float64
         Of the surface that the sand meets; see ``Perimeter``.
     surroundings : Surroundings, optional

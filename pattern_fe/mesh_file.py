@@ -35,7 +35,6 @@ def read_mesh(path: Path, unit_m: float = 1.0) -> Any:
 
     Parameters
     ----------
-    path : Path
     unit_m : float, m
         Length of the file's unit, 0.001 for millimetres.
 

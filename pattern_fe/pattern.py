@@ -46,8 +46,6 @@ class Pattern:
     ----------
     mesh : skfem.Mesh
         From ``shapes`` or ``mesh_file``.
-    supports : Supports
-    foam : Foam
     order : int
         Of the elements: 2, or 1 as in the paper, which is too stiff in bending.
     thickness_m : float, m
@@ -210,8 +208,6 @@ class Pattern:
         Parameters
         ----------
         displacement_m : (n, d) float64, m
-        large : bool
-            Whether they solve the nonlinear form.
 
         Returns
         -------

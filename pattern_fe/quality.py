@@ -46,15 +46,7 @@ def tetrahedron_quality(mesh: Any) -> Array:
 
 
 def mesh_sentence(scenario: Scenario, pattern: Pattern) -> str:
-    """Elements, unknowns, volume and quality of the mesh of a drawn pattern.
-
-    Parameters
-    ----------
-    scenario : Scenario
-        Whose pattern is drawn.
-    pattern : Pattern
-        Of the scenario.
-    """
+    """Elements, unknowns, volume and quality of the mesh of a drawn pattern."""
     config = scenario.pattern
     assert config is not None
     assert isinstance(config.shape, PatternDrawing)

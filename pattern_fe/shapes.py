@@ -45,7 +45,7 @@ def l_shape(thickness_m: float, height_m: float, reach_m: float) -> list[Rectang
 
 
 def mesh_of(rectangles: Sequence[Rectangle], element_m: float, depth_m: float | None = None) -> Any:
-    """Mesh a union of rectangles that overlap or share sides.
+    """Mesh a union of rectangles that overlap or share sides, with the sides of ``SIDES`` named.
 
     All corners lie on grid lines, and between two of these elements are equally long, no longer
     than asked: ``thickness_m / n`` gives n elements through a thickness.
@@ -57,11 +57,6 @@ def mesh_of(rectangles: Sequence[Rectangle], element_m: float, depth_m: float | 
         Longest side of an element.
     depth_m : float, m, optional
         Extrudes the shape along the second of three axes.
-
-    Returns
-    -------
-    skfem.MeshQuad or skfem.MeshHex
-        With the extreme sides named as in ``SIDES``.
 
     Raises
     ------

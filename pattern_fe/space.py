@@ -82,15 +82,11 @@ class Space:
         return np.asarray(nodes, dtype=np.int64)
 
     def assembled(self, matrices: Array) -> csc_array:
-        """Sum matrices of elements into one of all nodes.
+        """Sum matrices of elements into one of all nodes, (n d, n d) sparse float64.
 
         Parameters
         ----------
         matrices : (ne, k d, k d) float64
-
-        Returns
-        -------
-        (n d, n d) sparse float64
         """
         d, n = self.dimension, self.node_m.size
         rows = (self.cells[:, :, None] * d + np.arange(d)).reshape(len(self.cells), -1)
@@ -111,8 +107,6 @@ def space_of(mesh: Any, order: int = 2, thickness_m: float | None = None) -> Spa
     ----------
     mesh : skfem.Mesh
         Quadrilaterals, triangles, hexahedra or tetrahedra with straight edges.
-    order : int
-        Of the shape functions along an edge, 1 or 2.
     thickness_m : float, m
         Out of the plane: in 2D it must be given, in 3D it must not.
 

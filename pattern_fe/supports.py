@@ -35,11 +35,7 @@ class Supports:
 
 
 def fixed_components(space: Space, supports: Supports) -> Mask:
-    """Components of the displacement that supports keep at zero.
-
-    Returns
-    -------
-    (n, d) bool
+    """Components of the displacement that supports keep at zero, (n, d) bool.
 
     Raises
     ------
@@ -136,12 +132,7 @@ def loose_motions(node_m: Array, fixed: Mask) -> list[str]:
 
 
 def check_held(node_m: Array, fixed: Mask, supports: Supports) -> None:
-    """Refuse statics of a pattern that can move without deforming.
-
-    Raises
-    ------
-    ValueError
-    """
+    """Refuse statics of a pattern that can move without deforming."""
     if supports.bedding_n_m3 > 0.0:
         return
     loose = loose_motions(node_m, fixed)

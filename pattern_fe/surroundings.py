@@ -306,7 +306,6 @@ def points_on(solid: Solid, apart_m: float, low_m: Array, high_m: Array) -> Arra
 
     Parameters
     ----------
-    solid : Solid
     apart_m : float
         Distance of the points: vertices of the pattern are farther apart.
     low_m, high_m : (d,) float64, m

@@ -28,7 +28,6 @@ def drawing_mesh(shape: PatternDrawing, drawn: TriangleMesh, size_m: float) -> A
 
     Parameters
     ----------
-    shape : PatternDrawing
     drawn : TriangleMesh
         Its surface, about the drawing's origin, turned.
     size_m : float, m

@@ -103,10 +103,8 @@ def cache_folder() -> Path:
 def is_own(folder: Path) -> bool:
     """Make a folder and the one that it lies in, and say whether nobody else can write to them.
 
-    Parameters
-    ----------
-    folder : Path
-        One that others can write to is not used again, since it may hold what they have written.
+    ``folder``: one that others can write to is not used again, since it may hold what they have
+    written.
     """
     above = folder.parent
     try:

@@ -35,7 +35,6 @@ class Limit:
         ----------
         key : str
             Key that asks for so many.
-        count : float
         value : any, optional
             What stands there; the count unless given.
         """
@@ -50,12 +49,7 @@ class Limit:
         return f"with at most {self.most:,} {self.what}, not {_number(count)}: {self.change}"
 
     def check(self, key: str, count: float, value: Any = None) -> None:
-        """Refuse a count beyond the limit; parameters as in ``problems``.
-
-        Raises
-        ------
-        BadInputError
-        """
+        """Refuse a count beyond the limit; parameters as in ``problems``."""
         if found := [*self.problems(key, count, value)]:
             raise BadInputError(found)
 

@@ -37,13 +37,7 @@ def run_main(main: Callable[..., Any], usage: str, counts: Container[int] = (0,)
 
 
 def in_a_sentence(main: Callable[..., Any], *given: Any) -> Any:
-    """Call a function; after bad input or a file that cannot be read it ends with a sentence.
-
-    Raises
-    ------
-    SystemExit
-        With one sentence a problem.
-    """
+    """Call a function; after bad input or a file that cannot be read it ends with a sentence."""
     try:
         return main(*given)
     except BadInputError as error:

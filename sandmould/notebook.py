@@ -34,7 +34,8 @@ from sandmould.runs.columns import RUN
 from sandmould.scenario.quantity import NAME
 from sandmould.scenario.scenario import Scenario
 from sandmould.study.collect import Collected, read_collected
-from sandmould.study.plan.build_plan import RESULTS, Plan, checked_plan, known_prices, open_plan
+from sandmould.study.plan.announcement import known_prices
+from sandmould.study.plan.build_plan import RESULTS, Plan, checked_plan, open_plan
 from sandmould.study.plan.plan_files import VERDICT_FILE, plan_rows, read_run
 from sandmould.study.plan.price import study_s
 

@@ -6,7 +6,8 @@ from collections.abc import Sequence
 from pathlib import Path
 
 from sandmould.definition.run import Run
-from sandmould.study.plan import build_plan, plan_files
+from sandmould.study.plan import announcement, plan_files
+from sandmould.study.plan.build_plan import Plan
 
 
 def write_plan(runs: Sequence[Run], folder: Path) -> None:
@@ -16,7 +17,7 @@ def write_plan(runs: Sequence[Run], folder: Path) -> None:
     plan_files.write_plan(runs, folder)
 
 
-def announce(plan: build_plan.Plan, results: Path, cores: int) -> str:
+def announce(plan: Plan, results: Path, cores: int) -> str:
     """Announce a plan with the folders of all runs."""
     write_plan([*plan.fills, *plan.runs], results / plan.study.name)
-    return build_plan.announce(plan, results, cores)
+    return announcement.announce(plan, results, cores)

@@ -17,8 +17,7 @@ from typing import Any
 import jinja2
 
 from sandmould import ROOT
-from sandmould.execution.packs.recorded import RECORDS
-from sandmould.execution.records import DEFAULTS
+from sandmould.execution.records import DEFAULTS, RECORDS
 from sandmould.module_main import run_main
 from sandmould.runs.columns import OUTCOME, RUN, finished
 from sandmould.runs.formatting import listed

@@ -27,13 +27,13 @@ from benchmarks.frame import SCRATCH, Benchmark, BenchmarkRun, children_s, rende
 from sandmould import ROOT
 from sandmould.bad_input import BadInputError
 from sandmould.definition.run import Run
-from sandmould.execution.packs.recorded import RECORDS
-from sandmould.execution.records import OLDER_SOLVER, runs_in, why_stale
+from sandmould.execution.records import OLDER_SOLVER, RECORDS, runs_in, why_stale
 from sandmould.kinds.kind import CORE_SECONDS, SpeedClass
 from sandmould.kinds.registry import kind_of
 from sandmould.runs.columns import CPU_S, FILL_CPU_S, RUN, WALL_S, finished, total_s
 from sandmould.study.collect import read_summary
-from sandmould.study.plan.build_plan import Plan, known_prices, measure_speeds, open_plan
+from sandmould.study.plan.announcement import known_prices, measure_speeds
+from sandmould.study.plan.build_plan import Plan, open_plan
 from sandmould.study.plan.fills import own_work, share_fills
 from sandmould.study.plan.load_study import STUDIES, open_study
 from sandmould.study.plan.price import BEGIN_S, END_S, Prices, foretold_s, study_s

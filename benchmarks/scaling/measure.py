@@ -15,7 +15,8 @@ import pandas as pd
 
 from benchmarks.scaling.study import REPLICATES, SHARED, Place, ProcessCost, graft
 from sandmould.limits import RUNS
-from sandmould.study.plan.build_plan import RESULTS, announce, open_plan
+from sandmould.study.plan.announcement import announce
+from sandmould.study.plan.build_plan import RESULTS, open_plan
 
 _COLLECT = "from pathlib import Path; from sandmould.study.collect import collect; collect({0})"
 _REPORT = (

@@ -14,7 +14,8 @@ from sandmould.execution.jobs import compute_batch
 from sandmould.execution.loading import load_for
 from sandmould.execution.simulate import measure, render, simulate
 from sandmould.module_main import run_main
-from sandmould.study.plan.build_plan import RESULTS, announce, open_plan, prepare
+from sandmould.study.plan.announcement import announce, prepare
+from sandmould.study.plan.build_plan import RESULTS, open_plan
 from sandmould.study.plan.lacking import lack_of
 from sandmould.study.plan.plan_files import read_run, write_run
 

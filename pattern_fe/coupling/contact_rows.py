@@ -74,11 +74,6 @@ def products_over(surface: Perimeter) -> Array:
 def shares_along(pattern: Pattern, apart_m: float) -> Array:
     """Shape functions at points along the outer line of a pattern, an even distance apart.
 
-    Parameters
-    ----------
-    pattern : Pattern
-    apart_m : float, m
-
     Returns
     -------
     (points, nv) float64
@@ -104,7 +99,6 @@ def shares_on_top(pattern: Pattern, apart_m: float, up: float) -> csr_array:
 
     Parameters
     ----------
-    pattern : Pattern
     apart_m : float, m
         Least distance of two points; a face that is smaller has one, in its middle.
     up : float

@@ -89,7 +89,6 @@ class ConvergenceLog:
 
         Parameters
         ----------
-        path : Path
         trusted_bytes : int, optional
             Length of what a checkpoint vouches for; without it the table begins anew.
         kind : type

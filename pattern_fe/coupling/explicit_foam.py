@@ -73,10 +73,6 @@ class ExplicitFoam:
 
         Parameters
         ----------
-        pattern : Pattern
-        step_s : float, s
-            Of the grains.
-        contact : ContactBound
         mass_scale : float, optional
             Factor of all masses; just large enough for one step a step of the grains, and not
             below 1, unless given. With a smaller one the pattern goes in shorter steps.

@@ -33,16 +33,7 @@ class FoamBody:
     def __init__(
         self, pattern: Pattern, large: bool = False, surroundings: Surroundings | None = None
     ) -> None:
-        """Stand as drawn.
-
-        Parameters
-        ----------
-        pattern : Pattern
-        large : bool
-            Whether displacements are large.
-        surroundings : Surroundings, optional
-            What it can touch; nothing unless given.
-        """
+        """Stand as drawn."""
         self._pattern = pattern
         self._large = large
         self._surface = pattern.surface.outer

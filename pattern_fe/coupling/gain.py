@@ -47,12 +47,8 @@ def measure_gain(
     ----------
     session : SandSession
         Of an engine that repeats windows.
-    body : ElasticBody
-    surface : str
-        Its name in the engine.
     displacement_m : (nv, d) float64, m
         Displacement at the interface that the window leads to.
-    window_s : float
 
     Returns
     -------

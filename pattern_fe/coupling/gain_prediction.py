@@ -33,13 +33,6 @@ _UP = 0.5
 def predicted_gain(scenario: Scenario, pattern: Pattern, window_s: float) -> Gain:
     """Stiffness of a grain times the largest compliance of the pattern under the whole row.
 
-    Parameters
-    ----------
-    scenario : Scenario
-    pattern : Pattern
-        Of the scenario.
-    window_s : float
-
     Returns
     -------
     Gain

@@ -57,18 +57,10 @@ class InStepFoam:
 
         Parameters
         ----------
-        pattern : Pattern
-        step_s : float, s
-            Of the grains, and so of the pattern.
-        contacts : ContactRows
         largest_m : float, m
             Displacement beyond which the pattern has run away and stops.
-        mass_scale : float, optional
-            See ``selective_mass``.
         damping_ratio : float
             Of the slowest mode, by mass damping.
-        surroundings : Surroundings, optional
-            What it can touch; nothing unless given.
         """
         surface = pattern.condensed
         line = pattern.surface.outer_line

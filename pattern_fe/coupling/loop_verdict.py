@@ -97,7 +97,7 @@ class LoopVerdict:
 
 
 def classify_loop(log: pd.DataFrame, stopped: bool = False) -> LoopVerdict | None:
-    """Classify the last part of a convergence log.
+    """Classify the end of a convergence log; None where no sand pressed and it was not stopped.
 
     Energy of the shape at the interface above the work of the sand was never given by sand: such
     a loop goes in cycles, which shake the sand. It diverged where the median residual is above the
@@ -114,11 +114,6 @@ def classify_loop(log: pd.DataFrame, stopped: bool = False) -> LoopVerdict | Non
         was stepped with the grains.
     stopped : bool
         Whether the run ended because its pattern ran away.
-
-    Returns
-    -------
-    LoopVerdict or None
-        None where no sand has pressed on the pattern, unless it was stopped.
     """
     if log.empty or not log["load_n"].any():
         return LoopVerdict("diverged", np.nan, 0, np.nan, np.nan, 0.0) if stopped else None

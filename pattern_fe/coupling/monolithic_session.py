@@ -83,8 +83,6 @@ class MonolithicSession(SteppedSession[ExplicitFoam]):
             See ``SteppedSession``.
         largest_m : float
             Displacement beyond which the pattern has run away.
-        counts : StepCounts
-            Of the scenario.
         """
         super().__init__(sand, foam, body, surface, work, checkpoint, load_tolerance)
         self._largest_m, self._counts = largest_m, counts

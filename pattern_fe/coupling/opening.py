@@ -41,7 +41,6 @@ def open_coupled(
         Where the deck lies.
     log : Path
         The engine's log; tables of the pattern lie beside it.
-    checkpoint : Path, optional
     """
     scenario = program.scenario
     config = scenario.pattern

@@ -47,13 +47,10 @@ class PatternSession(DelegatingSession, ABC):
 
         Parameters
         ----------
-        sand : SandSession
         body : ElasticBody
             The pattern at rest under given loads.
         surface : str
             Its name in the engine, vertex for vertex that of the body.
-        load_tolerance : float, optional
-            See ``PatternRest``.
         """
         super().__init__(sand)
         self._body, self._surface = body, surface
@@ -134,10 +131,6 @@ class SteppedSession(PatternSession, Generic[Foam]):
         sand, body, surface, load_tolerance
             See ``PatternSession``; the body is the same pattern at rest.
         foam : ExplicitFoam or InStepFoam
-        work : Path
-            Folder of the tables.
-        checkpoint : Path, optional
-            Folder that ``write_checkpoint`` wrote.
         """
         super().__init__(sand, body, surface, load_tolerance)
         self._foam: Foam = foam

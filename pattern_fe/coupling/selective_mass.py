@@ -67,9 +67,6 @@ def selective_mass(
     ----------
     surface : CondensedSurface
         With the pattern's own masses.
-    contacts : ContactRows
-    step_s : float, s
-        Of grains and pattern.
     scale : float, optional
         Factor of the pattern's own masses; unless given the least from 1 on that leaves the
         first frequency to them: the rest of M takes one hundredth of it at most.

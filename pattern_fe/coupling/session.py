@@ -89,12 +89,6 @@ class CoupledSession(PatternSession):
             See ``PatternSession``; the engine can move the surface.
         loop : Loop
             Of the scenario; one that has windows.
-        counts : StepCounts
-            Of the scenario.
-        work : Path
-            Folder of the tables.
-        checkpoint : Path, optional
-            Folder that ``write_checkpoint`` wrote.
         surroundings : Surroundings, optional
             What the surface must not enter, wherever a scheme leads it.
         """

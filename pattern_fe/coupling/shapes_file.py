@@ -18,12 +18,7 @@ class ShapesFile:
     def __init__(self, path: Path, rows: int, vertices: int, dimension: int) -> None:
         """Open the file for appending after its trusted rows.
 
-        Parameters
-        ----------
-        path : Path
-        rows : int
-            That a checkpoint vouches for; 0 begins anew.
-        vertices, dimension : int
+        ``rows``: those that a checkpoint vouches for; 0 begins anew.
         """
         self.rows = rows
         path.touch()

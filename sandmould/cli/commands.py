@@ -94,7 +94,8 @@ app.command(epilog="Example: sandmould new tube --amplitude-mm 0.4 --frequency-h
 @app.command(epilog="Example: sandmould plan tube_demo --cores 4")
 def plan(study: StudyFile, cores: Cores = None, adopt: Adopt = False) -> None:
     """Check a study, print its runs and their price; nothing starts."""
-    from sandmould.study.plan.build_plan import RESULTS, announce, open_plan
+    from sandmould.study.plan.announcement import announce
+    from sandmould.study.plan.build_plan import RESULTS, open_plan
     from sandmould.study.plan.trust import reading_help
 
     if adopt:

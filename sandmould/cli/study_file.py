@@ -14,11 +14,6 @@ STUDIES = SHIPPED / "config" / "studies"
 def study_file(text: str) -> Path:
     """Find the file of a study.
 
-    Parameters
-    ----------
-    text : str
-        Path of a file, or the name of a study of ``config/studies``.
-
     Raises
     ------
     BadInputError

@@ -155,7 +155,6 @@ def problems_in_scene(own: Mapping[str, str], has: Collection[str]) -> Iterator[
 
     Parameters
     ----------
-    own : mapping of str to str
     has : collection of str
         Measures of the scene that are numbers.
     """
@@ -175,13 +174,6 @@ def problems_in_scene(own: Mapping[str, str], has: Collection[str]) -> Iterator[
 
 def with_own_measures(table: pd.DataFrame, own: Mapping[str, str]) -> pd.DataFrame:
     """Add a column for each own measure to a table of measures.
-
-    Parameters
-    ----------
-    table : DataFrame
-        One row a snapshot.
-    own : mapping of str to str
-        Formulas that have no problems.
 
     Returns
     -------

@@ -139,19 +139,10 @@ def _drawn(sweep: Sweep, whole: Mapping[str, bool], seed: int) -> Iterator[Point
 
 
 def points(sweep: Sweep, scenario: Any) -> list[Point]:
-    """All points of a sweep that has no problems.
+    """All points of a sweep that has no problems; an empty one where nothing is swept.
 
-    Parameters
-    ----------
-    sweep : Sweep
-    scenario : scenario of any kind
-        What is varied: its type says which keys take whole numbers only, its seed fixes the
-        points of a drawn design.
-
-    Returns
-    -------
-    list of dict
-        One empty point when nothing is swept.
+    ``scenario``: what is varied: its type says which keys take whole numbers only, its seed fixes
+    the points of a drawn design.
     """
     if sweep.design == "list":
         return [dict(p) for p in sweep.points]

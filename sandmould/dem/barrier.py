@@ -61,14 +61,7 @@ _look_now: Any = intrinsic(_look)
 
 @njit(**OPTIONS)
 def wait_for_all(counters: Ints, threads: int) -> None:
-    """Return when all threads have come here.
-
-    Parameters
-    ----------
-    counters : (16,) int64
-        Of ``new_barrier``, the same for all threads.
-    threads : int
-    """
+    """Return when all threads have come here."""
     if threads == 1:
         return
     turn = _look_now(counters, _TURN)

@@ -66,10 +66,8 @@ def candidates_in(
     position : (n, d or 3) float64, m
     radius : (n,) float64, m
     skin : float, m
-    arrays : SurfaceArrays
     shift : tuple of d floats, m
         Displacement of the box.
-    grid : FacetGrid
     moved : float, m
         How far any facet has moved since it was sorted into the grid.
     """

@@ -77,7 +77,6 @@ def pair_coefficients(law: Law, mass: float, smaller: float, effective: float) -
 
     Parameters
     ----------
-    law : Law
     mass : float, kg
         m1 m2 / (m1 + m2), or m1 at a surface, eq. (21).
     smaller : float, m
@@ -132,9 +131,6 @@ def contact(
     turn : float, s/m
         Time by which the normal is ahead of the velocities over the distance of the centres; 0
         where the slip is that of the normal as it is, such as at a face, whose normal stays.
-    sizes : PairCoefficients
-        Of this law.
-    law : Law
     dt : float, s
     friction, rolling : tuple of floats, N and N m
         Friction force on body 1 as a tangent and rolling moment on body 1 after the last step.

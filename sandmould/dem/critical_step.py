@@ -158,10 +158,7 @@ def _rows(solver: Solver, ends: _Ends, law: Law) -> ActiveContacts:
 def active_contacts(solver: Solver) -> ActiveContacts:
     """Give the contacts of the last step, with grains and with surfaces.
 
-    Parameters
-    ----------
-    solver : Solver
-        After a step, or after ``place``.
+    ``solver``: after a step, or after ``place``.
     """
     between = _rows(solver, _pair_ends(solver), solver.scene.grain_law)
     at_walls = _rows(solver, _wall_ends(solver), solver.scene.wall_law)
@@ -218,11 +215,7 @@ def whole_step(contacts: ActiveContacts, of_step_s: float | None = None) -> Stab
 
     The damped step is exact for central differences, whether or not the modes are damped alike.
 
-    Parameters
-    ----------
-    contacts : ActiveContacts
-    of_step_s : float, s, optional
-        Step that dashpots are corrected for; by default the limit itself.
+    ``of_step_s``: step that dashpots are corrected for; by default the limit itself.
     """
     if not len(contacts.first):
         return StableStep(0.0, math.inf, math.inf)

@@ -114,7 +114,6 @@ def sort_facets(dim: Any, arrays: SurfaceArrays, reach: float) -> FacetGrid:
     Parameters
     ----------
     dim : tuple of d floats
-    arrays : SurfaceArrays
     reach : float, m
         How far from a grain's centre facets are asked for.
     """
@@ -172,9 +171,6 @@ class FacetGrids:
         Parameters
         ----------
         dim : tuple of d floats
-        arrays : SurfaceArrays
-        reach_m : float
-            How far from a grain's centre facets are asked for.
         """
         moved_m = math.inf
         if self._corner is arrays.corner:

@@ -30,12 +30,6 @@ def _pair_up(radius: Floats, mass: Floats, law: Law, coefficients: Floats) -> No
 def pair_up(grains: Grains, law: Law) -> Floats:
     """What each two of k kinds make of each other.
 
-    Parameters
-    ----------
-    grains : Grains
-    law : Law
-        Of two grains.
-
     Returns
     -------
     (k, k, 3) float64

@@ -45,8 +45,6 @@ def damped(action: Any, rate: Any, inert: float, form: int, alpha: float) -> Any
     rate : tuple of floats, m/s or rad/s
         Velocity or spin half a step ago.
     inert : float, kg or kg m2
-    form : int
-    alpha : float
     """
     if form == VISCOUS:
         return plus(action, -alpha * inert, rate)
@@ -85,13 +83,8 @@ def kick(
 
     Parameters
     ----------
-    dim : tuple
-    first, last : int
-        Range of grains.
-    grains : Grains
     body : tuple of d floats, m/s2
         Gravity and, in the frame of the box, minus its acceleration, eq. (58).
-    damping : Damping
     dt : float, s
         Negative for half a step back to the time of the positions.
     """

@@ -287,8 +287,6 @@ def look(dim: Any, c: int, bound: Ints, grains: Grains, pairs: Pairs, near: Near
         The chunk.
     bound : (c + 1,) int64
         First grains of the chunks.
-    grains : Grains
-    pairs : Pairs
     near : NearPairs
         Of this chunk written to.
     """
@@ -358,17 +356,12 @@ def new_near_pairs(
     Parameters
     ----------
     dim : tuple of d floats
-    width : int
-        How many lanes there are.
     bound : (c + 1,) int64
         First grains of the chunks.
     grains : Grains
         Where the forces are found next.
-    pairs : Pairs
     contacts : Contacts
         Those that are not near are forgotten: they touch no more.
-    gap_m : float
-        Not negative.
     """
     counts = np.diff(bound)
     first_slice = np.concatenate([[0], (-(-counts // width)).cumsum()])
@@ -419,7 +412,6 @@ def watch(near: NearPairs, way: float, skin: float) -> None:
 
     Parameters
     ----------
-    near : NearPairs
     way : float, m
         Longest way of a grain in this step.
     skin : float, m

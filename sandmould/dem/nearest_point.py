@@ -156,7 +156,6 @@ def nearest(
     dim : tuple of d floats
     vertices, planes, shape, corner
         Of the ``SurfaceArrays``: a tuple of arrays costs more than its arrays.
-    part : int
     x : tuple of d floats, m
         A grain's centre in the frame of the box.
     reach : float, m

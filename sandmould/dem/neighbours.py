@@ -55,7 +55,6 @@ def make_grid(low: Floats, high: Floats, size: float, grains: int) -> Grid:
     low, high : (d,) float64, m
     size : float, m
         Least edge of a cell: the reach of the pairs to be found.
-    grains : int
     """
     span = np.maximum(high - low, size)
     size = max(size, float(np.prod(span) / (4 * grains + 64)) ** (1 / len(span)))
@@ -83,7 +82,6 @@ def sort_into_cells(position: Floats, grid: Grid) -> tuple[Ints, Ints]:
     ----------
     position : (n, d) float64, m
         Finite.
-    grid : Grid
 
     Returns
     -------
@@ -139,7 +137,6 @@ def find_pairs(
     skin : float, m
     start : (c + 1,) int64
         Of ``sort_into_cells``.
-    grid : Grid
 
     Returns
     -------

@@ -53,8 +53,6 @@ def pass_pairs(
     ----------
     dim : tuple
         ``PLANE`` or ``SPACE``.
-    lanes : tuple
-        As long as the slices are wide.
     c : int
         The chunk.
     grains : Grains
@@ -64,9 +62,6 @@ def pass_pairs(
         The next positions of grains that move on.
     coefficients : (k, k, 3) float64
         Of two kinds, for this law: see ``pair_up``.
-    near : NearPairs
-    law : Law
-    damping : Damping
     body : tuple of d floats, m/s2
         See ``kick``.
     dt : float, s

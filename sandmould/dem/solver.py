@@ -69,8 +69,6 @@ class Solver:
 
         Parameters
         ----------
-        scene : DemScene
-        surfaces : Surfaces
         skin_m : float
             Pairs nearer than this are listed; the list serves until a grain has gone half of it.
         threads : int
@@ -186,12 +184,7 @@ class Solver:
         Velocities stood half of the other step before now, and now stand half of this one before
         it. The box must stand.
 
-        Parameters
-        ----------
-        earlier_s : float
-            The other step.
-        steps : int
-            That count as done from now on.
+        ``steps``: those that count as done from now on.
         """
         scene, grains = self.scene, self.grains
         lag_s = 0.5 * (earlier_s - scene.dt)

@@ -240,12 +240,7 @@ def find_forces(dim: tuple[float, ...], scene: DemScene, moving: Moving) -> None
 
     Compiled code does not call it: with constants it would compile ``step_chunk`` a second time.
 
-    Parameters
-    ----------
-    dim : tuple
-        ``PLANE`` or ``SPACE``, which is also the shift, speed and body force: none.
-    scene : DemScene
-    moving : Moving
+    ``dim``: ``PLANE`` or ``SPACE``, which is also the shift, speed and body force: none.
     """
     for c in range(len(moving.bound) - 1):
         step_chunk(dim, c, scene, moving, moving.grains, moving.ahead, dim, dim, dim, 0.0, False)
@@ -336,17 +331,13 @@ def advance(
     ----------
     dim : tuple
         ``PLANE`` or ``SPACE``.
-    steps : int
     drifted : bool
         Whether the first step has already moved the grains and waited for new lists.
-    scene : DemScene
-    moving : Moving
     displacement : (steps + 2,) float64, m
         Of the box along its direction, from one step before the first.
     half_skin : float, m
     thread, threads : int
         Which of how many threads calls; each computes chunks of its own, and all return alike.
-    team : Team
 
     Returns
     -------

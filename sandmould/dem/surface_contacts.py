@@ -110,7 +110,6 @@ def surface_forces(
     dim : tuple of d floats
     first_row, last_row : int
         Rows first_row ... last_row - 1 of the candidates: several threads take rows of their own.
-    candidates : Candidates
     position, velocity : (n, d or 3) float64, m and m/s
     spin : (n, 1 or 3) float64, rad/s
     kind : (n,) integers
@@ -118,11 +117,8 @@ def surface_forces(
     radius, mass : (k,) float64, m and kg
     force, moment : (n, d or 3) and (n, 1 or 3) float64, N and N m
         Added to.
-    arrays : SurfaceArrays
     shift, shift_velocity : tuple of d floats, m and m/s
         Displacement and velocity of the box.
-    law : Law
-        Of grains against surfaces.
     dt : float, s
     keep : bool
         Whether this step's friction and rolling moments are kept for the next one; without it

@@ -99,7 +99,6 @@ class Surfaces:
 
         Parameters
         ----------
-        name : str
         point_m : (d,) float64, m
             Any point of the plane.
         normal : (d,) float64
@@ -116,7 +115,6 @@ class Surfaces:
 
         Parameters
         ----------
-        name : str
         vertices_m : (nv, d) float64, m
         facets : (nf, d) int64
             Vertices of each facet.
@@ -149,7 +147,6 @@ class Surfaces:
 
         Parameters
         ----------
-        name : str
         origin_m, axis : (3,) float64, m
             A point of the axis and its direction, of any length.
         profile_m : (k, 2) float64, m
@@ -228,7 +225,6 @@ class Surfaces:
 
         Parameters
         ----------
-        name : str
         target_vertices_m : (nv, d) float64, m
         window_s, step_s : float, s
             The window is rounded up to whole steps.
@@ -243,15 +239,11 @@ class Surfaces:
         self.arrays.steps_left[rows] = steps
 
     def forces(self, loads: Floats) -> dict[str, Floats]:
-        """Sum the loads on the vertices of each surface.
+        """Sum the loads on the vertices of each surface, (d,) float64, N, by its name.
 
         Parameters
         ----------
         loads : (nv, d) float64, N
-
-        Returns
-        -------
-        dict of surface to (d,) float64, N
         """
         return {name: loads[rows].sum(axis=0) for name, rows in self._range.items()}
 

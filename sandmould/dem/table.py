@@ -69,7 +69,6 @@ def next_place(
 
     Parameters
     ----------
-    table : MountedTable
     before, now : float, m
         Its places one step ago and now.
     push, sand : float, N
@@ -136,7 +135,6 @@ class TableSolver(Solver):
 
         Parameters
         ----------
-        table : MountedTable
         drive : TableDrive
             Its length is the number of steps.
 

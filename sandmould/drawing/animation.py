@@ -79,9 +79,6 @@ def make_film(
 
     Parameters
     ----------
-    run_folder : Path
-    label : str
-        How the page calls the run.
     reading : ((k,) float64 s, (k,) float64), optional
         Times and values of the objective.
     budget_bytes : int

@@ -43,11 +43,7 @@ _OKABE_ITO = ("#0072B2", "#D55E00", "#009E73", "#CC79A7", "#E69F00", "#56B4E9", 
 def tints(n: int, ordered: bool) -> tuple[Tint, ...]:
     """Colours of n settings, told apart with any colour vision.
 
-    Parameters
-    ----------
-    n : int
-    ordered : bool
-        Whether the settings have an order, which a run from dark to bright then shows.
+    ``ordered``: whether the settings have an order, which a run from dark to bright then shows.
     """
     if not ordered:
         return tuple(Tint(c, c) for c in (_OKABE_ITO * (n // len(_OKABE_ITO) + 1))[:n])
@@ -218,7 +214,6 @@ def lay_out(chart: Chart, size: tuple[int, int]) -> Laid:
 
     Parameters
     ----------
-    chart : Chart
     size : (int, int), px
         Width and height; rows of settings make the drawing as high as they need.
     """

@@ -33,11 +33,7 @@ class _Curve:
 def convergence_charts(log: pd.DataFrame, begins_s: float) -> tuple[ConvergenceChart, ...]:
     """Draw the convergence log of a run of any scheme.
 
-    Parameters
-    ----------
-    log : DataFrame
-    begins_s : float, s
-        When vibration begins: zero of the charts.
+    ``begins_s``: when vibration begins: zero of the charts.
     """
     windows = _averaged(log)
     windows[TIME_S] -= begins_s

@@ -63,13 +63,7 @@ def write_figures(
 ) -> None:
     """Write a folder of figures anew: charts as SVG in the page's colours, pictures as PNG.
 
-    Parameters
-    ----------
-    folder : Path
-    environment : Environment
-        Of the report's templates.
-    files : mapping of str to Chart or bytes
-        By name without its ending.
+    ``files``: by name without its ending.
     """
     shutil.rmtree(folder, ignore_errors=True)
     folder.mkdir()

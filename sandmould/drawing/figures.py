@@ -71,19 +71,7 @@ def _draw_scene(scenario: Scenario, ax: Axes, height_m: float, at: Snapshot | st
 
 
 def draw_dimensions(scenario: Scenario, bed_height_m: float | None) -> str:
-    """Draw the scene to scale with its dimensions in mm.
-
-    Parameters
-    ----------
-    scenario : Scenario
-    bed_height_m : float, m, optional
-        Height of the filled bed, shown as a line.
-
-    Returns
-    -------
-    str
-        SVG as a ``data:`` address.
-    """
+    """Draw the scene to scale with its dimensions in mm: SVG as a ``data:`` address."""
     return _address("image/svg+xml", svg_bytes(dimensioned(scenario, bed_height_m)))
 
 
@@ -103,7 +91,6 @@ def dimensioned(
 
     Parameters
     ----------
-    scenario : Scenario
     bed_height_m : float, m, optional
         Height of the filled bed, shown as a line where there are no grains.
     grains : Snapshot, optional
@@ -209,20 +196,7 @@ class DensityScale:
 def draw_layers(
     snapshots: Sequence[Snapshot], scenario: Scenario, height_m: float
 ) -> tuple[str, ...]:
-    """Draw each snapshot with its grains in the colour of their layer of fill.
-
-    Parameters
-    ----------
-    snapshots : sequence of Snapshot
-    scenario : Scenario
-    height_m : float, m
-        Up to which the box is shown.
-
-    Returns
-    -------
-    tuple of str
-        PNG as ``data:`` addresses.
-    """
+    """Draw each snapshot with grains in the colour of their layer: PNG as ``data:`` addresses."""
 
     def layers(ax: Axes, snapshot: Snapshot) -> None:
         draw_by_layer(snapshot, ax, cut_m(scenario))
@@ -238,13 +212,6 @@ def draw_densities(
     snapshots: Sequence[Snapshot], scenario: Scenario, height_m: float
 ) -> tuple[tuple[str, ...], DensityScale, tuple[float, ...]]:
     """Draw each snapshot with its grains coloured by apparent density, on one scale.
-
-    Parameters
-    ----------
-    snapshots : sequence of Snapshot
-    scenario : Scenario
-    height_m : float, m
-        Up to which the box is shown.
 
     Returns
     -------

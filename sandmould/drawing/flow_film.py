@@ -54,18 +54,7 @@ class FlowFilm(PackedFilm):
 def make_flow_film(
     fields: Mapping[str, Array], run: str, label: str, highest_pa: float, budget_bytes: int
 ) -> FlowFilm:
-    """Pack the records of a run; records are left out to keep the budget, particles never.
-
-    Parameters
-    ----------
-    fields : mapping
-        Arrays of ``fields.npz``.
-    run, label : str
-    highest_pa : float, Pa
-        Full shade of the pressure.
-    budget_bytes : int
-        Most that ``data`` may weigh.
-    """
+    """Pack the records of a run; records are left out to keep the budget, particles never."""
     total = len(fields["time_s"])
     return within_budget(
         lambda chosen: _pack(fields, chosen, run, label, highest_pa),

@@ -25,7 +25,7 @@ _MM = 1e3
 def draw_loose_field(
     field: LooseField, zones: Sequence[int], last: Snapshot, scenario: Scenario, height_m: float
 ) -> str:
-    """Draw a field in the plane of the other pictures, and the outlines of zones.
+    """Draw a field in the plane of the other pictures and outlines of zones: a ``data:`` address.
 
     Parameters
     ----------
@@ -34,16 +34,6 @@ def draw_loose_field(
     zones : sequence of int
         Those that are outlined, as seen along y, and numbered from 1: in full where the plane cuts
         them, else dashed.
-    last : Snapshot
-        What it is of.
-    scenario : Scenario
-    height_m : float, m
-        Up to which the box is shown.
-
-    Returns
-    -------
-    str
-        PNG as a ``data:`` address.
     """
     plane_m = cut_m(scenario) or 0.0
     shape = field.share.shape

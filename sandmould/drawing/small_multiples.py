@@ -42,10 +42,7 @@ class SmallMultiples:
 def small_multiples(chart: Chart) -> SmallMultiples | None:
     """Split a chart into a panel for each mean; None where its lines are few.
 
-    Parameters
-    ----------
-    chart : Chart
-        Of lines whose group names their setting.
+    ``chart``: of lines whose group names their setting.
     """
     means = [line for line in chart.lines if line.style == "mean"]
     if len(means) <= MOST_LINES:

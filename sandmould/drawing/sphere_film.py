@@ -118,8 +118,6 @@ class SphereFrames:
         Parameters
         ----------
         grains : (k,) int64
-        frames : sequence of int
-            Their places.
         """
         points = np.append(grains, np.arange(len(self.radius_m), self.place.shape[2]))
         share = np.rint(self.radius_m[grains] / self.film.largest_radius_m * 65535)
@@ -167,9 +165,6 @@ class SphereFrames:
 
         Parameters
         ----------
-        cut_m : float, m
-        budget_bytes : int
-            As in :meth:`light`.
         folder_href : str
             Address of the folder of scripts, seen from the page.
 
@@ -217,13 +212,10 @@ def sphere_frames(
     snapshots : sequence of Snapshot or Moment
         At least one, in order of time; moments are read one at a time. Thinned so that all grains
         fit beside the page.
-    scenario : Scenario
     run, label : str
         Name of the run, and how the page calls it.
     scale : DensityScale
         Ends of the shades of density.
-    reading : ((k,) float64 s, (k,) float64), optional
-        Times and values of the objective.
     """
     most = max(2, min(MOST_FRAMES, MOST_BESIDE // max(1, len(_read(snapshots[-1]).id))))
     chosen = [snapshots[i] for i in evenly(len(snapshots), most).tolist()]

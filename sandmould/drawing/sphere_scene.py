@@ -7,7 +7,9 @@ import zlib
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, replace
 
+import fast_simplification
 import numpy as np
+import trimesh
 from matplotlib import colormaps
 from matplotlib.colors import to_hex
 from numpy.typing import NDArray
@@ -24,10 +26,8 @@ from sandmould.scenario.scenario import Scenario
 SIDES = 48
 """Of the polygon that a round solid is drawn as."""
 MOST_TRIANGLES = 40_000
-"""A solid of more is drawn with its vertices joined on a grid, which eyes do not see."""
-_GRIDS = (512, 256, 128, 64)
-"""Cells of such grids across the longest side."""
-_SHARP = np.cos(np.deg2rad(25.0))
+"""A solid of more is drawn coarser, which eyes do not see."""
+_SHARP_RAD = np.deg2rad(25.0)
 """An edge is drawn where faces turn by more than this."""
 SHADES = tuple(to_hex(colour) for colour in colormaps["viridis"](np.arange(255) / 254))
 UNKNOWN = 255
@@ -72,8 +72,6 @@ def sphere_scene(
     ----------
     scenario : Scenario
         In three dimensions.
-    top_m : float, m
-        Height up to which the box is shown.
     fields : sequence of SurfaceField, optional
         By which the solids can be coloured.
     """
@@ -104,8 +102,6 @@ def solid_scene(
         Blocks and meshes.
     low_m, high_m : (3,) float64, m
         Corners of the box, which need not be at the origin.
-    fields : sequence of SurfaceField, optional
-        As in :func:`sphere_scene`.
     """
     moved = [replace(field, place_m=field.place_m - low_m) for field in fields]
     packed = []
@@ -147,23 +143,11 @@ def _triangles(solid: Solid) -> tuple[Array, NDArray[np.int64]]:
     mesh = solid.mesh(SIDES) if isinstance(solid, Revolved) else solid
     assert isinstance(mesh, TriangleMesh)
     vertices_m, triangles = mesh.vertices_m, mesh.triangles
-    for cells in _GRIDS:
-        if len(triangles) <= MOST_TRIANGLES:
-            break
-        vertices_m, triangles = _joined(mesh.vertices_m, mesh.triangles, cells)
-    return vertices_m, triangles
-
-
-def _joined(
-    vertices_m: Array, triangles: NDArray[np.int64], cells: int
-) -> tuple[Array, NDArray[np.int64]]:
-    """The surface with all vertices of a cell of a grid in one place."""
-    size_m = float(np.ptp(vertices_m, axis=0).max()) / cells
-    cell = np.floor((vertices_m - vertices_m.min(axis=0)) / size_m)
-    _, first, at = np.unique(cell, axis=0, return_index=True, return_inverse=True)
-    joined = at.reshape(-1)[triangles]
-    flat = (joined == np.roll(joined, 1, axis=1)).any(axis=1)
-    return vertices_m[first], joined[~flat].astype(np.int64)
+    if len(triangles) > MOST_TRIANGLES:
+        vertices_m, triangles = fast_simplification.simplify(
+            vertices_m, triangles, target_count=MOST_TRIANGLES
+        )
+    return vertices_m, triangles.astype(np.int64)
 
 
 def _cut_small(
@@ -217,33 +201,11 @@ def _packed(
 
 
 def sharp_edges(vertices_m: Array, triangles: NDArray[np.int64]) -> NDArray[np.int64]:
-    """Edges at which a surface turns, or ends.
-
-    Parameters
-    ----------
-    vertices_m : (nv, 3) float64, m
-    triangles : (nt, 3) int64
-
-    Returns
-    -------
-    (k, 2) int64
-        The vertices of each.
-    """
-    a, b, c = vertices_m[triangles].transpose(1, 0, 2)
-    normal = np.cross(b - a, c - a)
-    normal /= np.maximum(np.linalg.norm(normal, axis=1), 1e-300)[:, None]
-    pairs = np.sort(
-        np.concatenate([triangles[:, [0, 1]], triangles[:, [1, 2]], triangles[:, [2, 0]]])
-    )
-    owner = np.tile(np.arange(len(triangles)), 3)
-    order = np.lexsort((pairs[:, 1], pairs[:, 0]))
-    pairs, owner = pairs[order], owner[order]
-    same = (pairs[1:] == pairs[:-1]).all(axis=1)
-    smooth = np.zeros(len(pairs), dtype=np.bool_)
-    flat = same & (np.sum(normal[owner[1:]] * normal[owner[:-1]], axis=1) > _SHARP)
-    smooth[1:] |= flat
-    smooth[:-1] |= flat
-    return np.unique(pairs[~smooth], axis=0)
+    """Edges at which a surface turns, or ends: their vertices, (k, 2) int64."""
+    mesh = trimesh.Trimesh(vertices_m, triangles, process=False)
+    flat = mesh.face_adjacency_edges[mesh.face_adjacency_angles < _SHARP_RAD]
+    edges = trimesh.grouping.boolean_rows(mesh.edges_unique, flat, np.setdiff1d)
+    return np.asarray(edges, dtype=np.int64)
 
 
 def _cavity_lines(scenario: Scenario) -> list[Array]:

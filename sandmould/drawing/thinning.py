@@ -28,7 +28,6 @@ def drawn_part(collected: Collected, verdict: Verdict) -> tuple[Collected, Verdi
     ----------
     collected : Collected
         Runs that the verdict was made from.
-    verdict : Verdict
 
     Returns
     -------

@@ -66,12 +66,7 @@ def render_parts(
 
     Before the bed is known the planned step stands in the second part too.
 
-    Parameters
-    ----------
-    dialect : str
-    program : Program
-    context_of : callable
-        Names and values for the templates, of a program.
+    ``context_of``: names and values for the templates, of a program.
     """
     scenario, filled = program.scenario, program.fill_stages
     if not scenario.takes_step_of_bed or filled == len(program.stages):

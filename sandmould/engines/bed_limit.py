@@ -25,9 +25,6 @@ def limit_of_snapshot_s(
 
     Parameters
     ----------
-    scenario : Scenario
-    stage : Stage
-    snapshot : Snapshot
     opened : iterable of str
         Plates that were taken away.
 

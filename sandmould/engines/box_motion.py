@@ -14,11 +14,8 @@ def displacements(stage: Stage, first: int, count: int, step_s: float) -> Array:
 
     Parameters
     ----------
-    stage : Stage
     first : int
         First step, counted from the stage's beginning.
-    count : int
-    step_s : float
 
     Returns
     -------
@@ -36,14 +33,6 @@ def start_of_grains(
     scenario: Scenario, stage: Stage, steps: int, step_s: float
 ) -> tuple[Array, Array]:
     """Where and how fast grains begin that stand still while the box vibrates.
-
-    Parameters
-    ----------
-    scenario : Scenario
-    stage : Stage
-    steps : int
-        Steps since the stage began.
-    step_s : float
 
     Returns
     -------
@@ -65,13 +54,7 @@ def start_of_grains(
 def box_motion(scenario: Scenario, stage: Stage, steps: int, step_s: float) -> tuple[Array, Array]:
     """Displacement (d,) in m and velocity (d,) in m/s of the walls, zero in the box frame.
 
-    Parameters
-    ----------
-    scenario : Scenario
-    stage : Stage
-    steps : int
-        Steps since the stage began.
-    step_s : float
+    ``steps``: since the stage began.
 
     Notes
     -----

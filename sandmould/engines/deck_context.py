@@ -35,13 +35,7 @@ def _checks(program: Program) -> dict[str, tuple[int, int]]:
 def deck_context(program: Program, lines: Lines, run: str, study: str) -> dict[str, Any]:
     """Names and values for the templates of any dialect; an engine adds its own.
 
-    Parameters
-    ----------
-    program : Program
-    lines : Lines
-        Of the program's scenario.
-    run, study : str
-        Names for the deck's first line.
+    ``run``, ``study``: names for the deck's first line.
     """
     scenario = program.scenario
     counts = StepCounts.of(scenario)

@@ -50,11 +50,8 @@ class Driver:
 
         Parameters
         ----------
-        program : Program
         folder : Path
             Holds the deck; partial work goes to its ``work`` folder.
-        name : str
-            Short name for the progress line.
         scenario_hash : str
             Tells this scenario's checkpoints from those of another.
         open_session : Opening, optional

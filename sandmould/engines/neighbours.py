@@ -21,7 +21,6 @@ def near_pairs(
     Parameters
     ----------
     position_m : (n, d) float64, m
-    reach_m : float, m
 
     Yields
     ------
@@ -62,7 +61,6 @@ def touching_pairs(
     ----------
     position_m : (n, d) float64, m
     radius_m : (n,) float64, m
-    gap_m : float, m
 
     Yields
     ------

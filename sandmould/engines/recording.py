@@ -25,12 +25,7 @@ class Recorder:
     def __init__(self, work: Path, dimension: int, mark: CheckpointMark | None = None) -> None:
         """Open the tables, cut back to what a checkpoint vouches for.
 
-        Parameters
-        ----------
-        work : Path
-        dimension : int
-        mark : CheckpointMark, optional
-            The checkpoint that the run continues from.
+        ``mark``: the checkpoint that the run continues from.
         """
         create_tables(work, dimension)
         self._snapshots = SnapshotFile(work, mark.snapshots if mark else 0)

@@ -94,15 +94,6 @@ class DeckReaderModule(Protocol):
     def read_deck(self, folder: Path, deck: str, log: Path) -> None:
         """Have the engine read a deck from its first line to its last; every rank calls this.
 
-        Parameters
-        ----------
-        folder : Path
-            Working folder of the deck.
-        deck : str
-            Its name in there.
-        log : Path
-            The engine's log.
-
         Raises
         ------
         EngineStop
@@ -138,13 +129,7 @@ def engine_module(name: EngineName) -> EngineModule:
 
 
 def engines_that(can: Callable[[Capabilities], bool]) -> list[str]:
-    """Names of the engines whose sessions can do something, in the order of the registry.
-
-    Parameters
-    ----------
-    can : callable
-        Whether capabilities are enough.
-    """
+    """Names of the engines whose sessions can do something, in the order of the registry."""
     return [name for name in ENGINE_NAMES if can(engine_module(name).CAPABILITIES)]
 
 

@@ -57,11 +57,7 @@ _LACKS = re.compile(r"(Unrecognized|Invalid|Unknown) (\w+ ){0,2}style|not enable
 def engine_stop(engine: str, message: str, of_user: bool = False) -> EngineStop:
     """Outcome that fits an error message of LAMMPS or LIGGGHTS, which is quoted.
 
-    Parameters
-    ----------
-    engine, message : str
-    of_user : bool
-        Whether the deck is the user's own, in which a style can be misspelt.
+    ``of_user``: whether the deck is the user's own, in which a style can be misspelt.
     """
     text = " ".join(message.split())
     if _LOST.search(text):
@@ -213,10 +209,7 @@ class SandSession(Session, Protocol):
     def hold_rest(self, why: str) -> None:
         """Let the stage go on while something else than the sand still moves.
 
-        Parameters
-        ----------
-        why : str
-            What has moved since the last check.
+        ``why``: what has moved since the last check.
         """
 
     def vertex_loads(self, name: str) -> Array | None:
@@ -241,21 +234,12 @@ class SandSession(Session, Protocol):
         """
 
     def move_surface(self, name: str, vertices_m: Array, window_s: float) -> None:
-        """Move a surface to new vertices over the next window, or refuse.
-
-        Raises
-        ------
-        RefusedError
-        """
+        """Move a surface to new vertices over the next window, or refuse."""
 
     def save_checkpoint(self) -> Any:
         """Give all that is needed to compute on from here, in memory, or refuse.
 
         For another iteration of a window; ``write_checkpoint`` is for another process.
-
-        Raises
-        ------
-        RefusedError
         """
 
     def restore_checkpoint(self, checkpoint: Any) -> None:
@@ -265,8 +249,4 @@ class SandSession(Session, Protocol):
         """Let a surface be moved in every step by the loads on it, or refuse.
 
         A session opened from a checkpoint is given it again.
-
-        Raises
-        ------
-        RefusedError
         """

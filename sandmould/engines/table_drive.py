@@ -67,14 +67,7 @@ class TableMotion:
 
 
 def table_motion(program: Program, stage: Stage) -> TableMotion | None:
-    """How the table moves in a stage; None where it stands, or moves as laid down.
-
-    Parameters
-    ----------
-    program : Program
-    stage : Stage
-        Any stage, of the program or not.
-    """
+    """How the table moves in a stage; None where it stands, or moves as laid down."""
     vibration = stage.vibration
     if vibration is not None:
         if vibration.unbalance is None:

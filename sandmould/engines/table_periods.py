@@ -67,11 +67,8 @@ def window_of(
 
     Parameters
     ----------
-    table : MountedTable
-    drive : TableDrive
     places_m : (steps + 2,) float64, m
     times_s : (steps,) float64, s
-    step_s : float
     """
     before, now, after = places_m[:-2], places_m[1:-1], places_m[2:]
     way, speed = 0.5 * (after - before), 0.5 * (after - before) / step_s
@@ -102,22 +99,14 @@ class TablePeriods:
     def add(
         self, stage: str, frequency_hz: float, periods: int, offset_s: float, window: Window
     ) -> list[TablePeriod]:
-        """Take in a window.
+        """Take in a window; gives the periods that have ended in it.
 
         Parameters
         ----------
-        stage : str
-        frequency_hz : float
         periods : int
             Of the stage; steps after the last one are left out.
         offset_s : float
             Time of vibration when the stage began.
-        window : Window
-
-        Returns
-        -------
-        list of TablePeriod
-            Periods that have ended in it.
         """
         self.steps = np.concatenate([self.steps, np.column_stack(window)])
         number = np.floor(self.steps[:, 0] * frequency_hz + 1e-9).astype(np.int64)

@@ -25,7 +25,6 @@ def forget(names: Sequence[str], results: Path) -> list[Path]:
     ----------
     names : sequence of str
         Of runs: ``RUN``, ``STUDY/RUN`` or the path of a run's folder.
-    results : Path
 
     Returns
     -------

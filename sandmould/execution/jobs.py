@@ -48,10 +48,6 @@ def do_job(work: str, *given: Any, log: str) -> None:
     ----------
     work : str
         Module and function: what it imports is imported by its own process alone.
-    *given
-        What it takes.
-    log : str
-        Path of the file that takes what is printed.
 
     Raises
     ------
@@ -73,9 +69,6 @@ def compute_run(folder: Path, log: str, ranks: int, mpi: str) -> None:
 
     Parameters
     ----------
-    folder : Path
-        Its own, with its ``scenario.yaml``.
-    log : str
     ranks : int
         MPI ranks; 1 for an engine whose ranks are threads of one process.
     mpi : str
@@ -94,17 +87,6 @@ def compute_batch(
     folders: Sequence[Path], log: str, ranks: int, mpi: str, side_by_side: int = 1
 ) -> None:
     """Render, compute and measure runs, those left out that are there already.
-
-    Parameters
-    ----------
-    folders : sequence of Path
-        Their own, with their ``scenario.yaml``.
-    log : str
-        Takes what all of them print.
-    ranks : int
-    mpi : str
-    side_by_side : int
-        Runs at a time.
 
     Raises
     ------

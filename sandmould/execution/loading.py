@@ -13,13 +13,7 @@ _COMPILING = "sandmould.compiled"
 
 
 def load_for(scenario: Any) -> None:
-    """Load what computes and measures runs like one, and the compiled code that such runs called.
-
-    Parameters
-    ----------
-    scenario : scenario
-        Of any kind.
-    """
+    """Load what computes and measures runs like one, and the compiled code that they called."""
     kind = kind_of(scenario)
     kind.execution.load_computing(scenario)
     kind.execution.load_measuring(scenario)

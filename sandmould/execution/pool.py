@@ -48,10 +48,7 @@ class End(NamedTuple):
 def start_server(folders: Iterable[Path] = ()) -> None:
     """Start the server of this process, unless it is there; it loads while this process goes on.
 
-    Parameters
-    ----------
-    folders : iterable of Path
-        Of runs, one of each class of those that are to be computed.
+    ``folders``: of runs, one of each class of those that are to be computed.
     """
     with _ONE_AT_A_TIME:
         _CONTEXT.set_forkserver_preload(["sandmould.execution.preload"])
@@ -72,8 +69,6 @@ def do(work: Callable[..., int | None], *given: Any, log: Path, name: str = "") 
     ----------
     work : callable
         A function of a module; gives the exit status, None for 0.
-    *given
-        What it takes.
     log : Path
         Takes all that it prints, which also goes to standard error.
     name : str

@@ -1,9 +1,8 @@
 """Committed results and whether they still stand for what the code would compute.
 
 ``python -m sandmould.execution.records record STUDY.yaml [FIGURE ...]`` copies a finished study's
-tables, and the figures that its pages show, with what was run; ``part STUDY.yaml`` packs the runs
-of an unfinished one that are at their end, which the next start of the study takes up. ``check``
-lists the records that are stale and computes the smallest one of each kind again.
+tables, and the figures that its pages show, with what was run. ``check`` lists the records that
+are stale and computes the smallest one of each kind again.
 """
 
 from __future__ import annotations
@@ -24,7 +23,6 @@ from sandmould import ROOT
 from sandmould.definition.run import Run
 from sandmould.definition.study import Study
 from sandmould.digest import digest
-from sandmould.execution.packs.recorded import RECORDS, record_part
 from sandmould.kinds.registry import kind_of
 from sandmould.module_main import run_main
 from sandmould.runs.columns import (
@@ -41,11 +39,12 @@ from sandmould.runs.hashing import scenario_hash
 from sandmould.runs.manifest import read_manifest
 from sandmould.runs.outcome import Outcome
 from sandmould.study.collect import read_collected, read_summary
-from sandmould.study.plan.build_plan import open_plan, planned_runs
+from sandmould.study.plan.build_plan import planned_runs
 from sandmould.study.plan.load_study import OpenStudy, open_study
 from sandmould.study.plan.plan_files import CHECKS, FIGURES, SUMMARY
 from sandmould.study.rounds.round_log import ROUNDS_FILE, read_rounds
 
+RECORDS = ROOT / "docs" / "results"
 OVER_TIME = "over_time.tsv"
 TIMES = 8
 """Moments of the vibration, equally far apart, at which a record keeps what the study judges."""
@@ -60,9 +59,7 @@ OLD_DEFAULTS = "old defaults"
 OLDER_SOLVER = "older solver"
 """Of a record: its scenarios are those of today, what computes them has changed since. It counts
 as long as the cheapest study of its kind, computed again, agrees with its own record."""
-USAGE = (
-    "python -m sandmould.execution.records check | record STUDY.yaml [FIGURE ...] | part STUDY.yaml"
-)
+USAGE = "python -m sandmould.execution.records check | record STUDY.yaml [FIGURE ...]"
 SAME = {
     "tube_fill_fraction": 0.05,
     "solid_fraction": 0.02,
@@ -100,8 +97,6 @@ def record(path: Path, results: Path, figures: Sequence[str] = ()) -> Path:
 
     Parameters
     ----------
-    path, results : Path
-        Of the study, and where its results lie.
     figures : sequence of str
         Names of figures that a page shall show. Those that the record has are kept, too, as they
         are drawn now.
@@ -169,7 +164,6 @@ def over_time(curves: pd.DataFrame, measure: str) -> pd.DataFrame:
     ----------
     curves : DataFrame
         One row a snapshot.
-    measure : str
 
     Returns
     -------
@@ -289,9 +283,6 @@ def main(arguments: list[str]) -> int:
     """Check all records, or keep one study."""
     if arguments[:1] == ["record"] and len(arguments) > 1:
         print(record(Path(arguments[1]), Path("results"), arguments[2:]))
-        return 0
-    if arguments[:1] == ["part"] and len(arguments) == 2:
-        print(record_part(open_plan(Path(arguments[1])), Path("results")))
         return 0
     if arguments != ["check"]:
         print(f"usage: {USAGE}", file=sys.stderr)

@@ -37,8 +37,6 @@ def run_study(path: Path, options: Sequence[str], opening: str = "") -> int:
 
     Parameters
     ----------
-    path : Path
-        The study's file.
     options : sequence of str
         Of Snakemake, such as ``--cores 4`` or ``--workflow-profile profiles/slurm``.
     opening : str, optional
@@ -149,10 +147,6 @@ def _be_snakemake(arguments: Sequence[str], folder: Path) -> None:
 
 def stated_cores(options: Sequence[str]) -> int | None:
     """Cores, or jobs at a time, as the options of Snakemake state them; None where none does.
-
-    Parameters
-    ----------
-    options : sequence of str
 
     Returns
     -------

@@ -70,7 +70,6 @@ def simulate(folder: Path, run: Run | None = None) -> int:
 
     Parameters
     ----------
-    folder : Path
     run : Run, optional
         Read from its folder unless given.
 

@@ -32,7 +32,8 @@ from sandmould.runs.hashing import scenario_hash
 from sandmould.runs.manifest import change, read_manifest
 from sandmould.runs.outcome import Outcome, RunOutcome
 from sandmould.runs.progress import duration_text
-from sandmould.study.plan.build_plan import Plan, stored_speeds
+from sandmould.study.plan.announcement import stored_speeds
+from sandmould.study.plan.build_plan import Plan
 from sandmould.study.plan.lacking import WHOLE, Lack, Need
 from sandmould.study.plan.plan_files import read_run
 from sandmould.study.rounds.round_log import read_rounds
@@ -121,15 +122,6 @@ def run_statuses(
     """Where each run stands, by its name; the fills that runs share come first.
 
     A fill that no run waits for any more counts where it was computed.
-
-    Parameters
-    ----------
-    plan : Plan
-    results : Path
-    lacks : mapping of str to Lack
-        See ``Plan.lacks``.
-    live : collection of str, optional
-        As of ``run_status``.
     """
     folder = results / plan.study.name
     fills = [
@@ -146,14 +138,7 @@ def run_statuses(
 def status_text(plan: Plan, results: Path, cores: int, deep: bool = False) -> str:
     """Say where a study stands: done, running, failed, time left, cost so far.
 
-    Parameters
-    ----------
-    plan : Plan
-    results : Path
-    cores : int
-        That share what is left.
-    deep : bool
-        Whether all files of runs that are done or failed are compared with their hashes.
+    ``deep``: whether all files of runs that are done or failed are compared with their hashes.
     """
     folder = results / plan.study.name
     lacks, live = plan.lacks(results), live_jobs()

@@ -41,8 +41,6 @@ def until_stopped(work: Callable[[], int], name: str) -> int:
     ----------
     work : callable
         Gives the exit status.
-    name : str
-        What the command computes.
 
     Returns
     -------
@@ -97,16 +95,10 @@ def run_in_group(
         What the process does that is forked from this one; ends by ``SystemExit``.
     log : file, optional
         Takes all that it and its jobs print; the terminal unless given.
-    environment : mapping of str to str, optional
     look : callable, optional
         Called while it runs; gives the seconds until the next call.
     asked_first : bool
         Whether it is first asked to end, as Snakemake must be to cancel jobs elsewhere.
-
-    Returns
-    -------
-    int
-        Exit status.
 
     Raises
     ------

@@ -15,12 +15,7 @@ class TimeLeft:
     def __init__(self, runs: Iterable[Run], rate_per_s: Mapping[SpeedClass, float]) -> None:
         """Begin with no finished run.
 
-        Parameters
-        ----------
-        runs : iterable of Run
-            All of the study.
-        rate_per_s : mapping of SpeedClass to float
-            Work a second of one core, as measured on this machine.
+        ``rate_per_s``: work a second of one core, as measured on this machine.
         """
         self._runs = {run.run: run for run in runs}
         self._rate_per_s = rate_per_s
@@ -52,14 +47,8 @@ class TimeLeft:
     def seconds(self, running: Mapping[str, float], waiting: Collection[str], cores: int) -> float:
         """Wall time until the report is written; 0 where no run is left.
 
-        Parameters
-        ----------
-        running : mapping of str to float
-            Runs that are being computed, or stopped on the way, with the share that is done.
-        waiting : collection of str
-            Runs that have not begun.
-        cores : int
-            That share them.
+        ``running``: runs that are being computed, or stopped on the way, with the share that is
+        done.
         """
         pieces = [self._rest(run, share) for run, share in running.items()]
         pieces += [self.prices.piece(self._runs[run]) for run in waiting]

@@ -37,12 +37,7 @@ def tells_unit(path: Path) -> bool:
 
 
 def check_numbers(values: NDArray[np.float64], what: str) -> None:
-    """Refuse rows of coordinates that are nowhere.
-
-    Raises
-    ------
-    MeshFileError
-    """
+    """Refuse rows of coordinates that are nowhere."""
     nowhere = ~(np.abs(values.reshape(len(values), -1)) < LARGEST).all(axis=1)
     if nowhere.any():
         place = f"{what} {int(nowhere.argmax()) + 1} of {len(values)} has another"

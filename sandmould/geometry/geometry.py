@@ -31,15 +31,11 @@ class Wall:
     """(d,) float64: unit normal pointing into the sand."""
 
     def distance_m(self, position_m: Array) -> Array:
-        """Signed distance of points from the wall, positive on the sand's side.
+        """Signed distance of points from the wall, positive on the sand's side, (n,) float64, m.
 
         Parameters
         ----------
         position_m : (n, d) float64, m
-
-        Returns
-        -------
-        (n,) float64, m
         """
         return (position_m - self.point_m) @ self.normal
 
@@ -61,28 +57,20 @@ class Block:
     """(d, d) float64: the block's orthonormal axes, one a row."""
 
     def local(self, position_m: Array) -> Array:
-        """Coordinates of points in the block's own axes, origin at its centre.
+        """Coordinates of points in the block's own axes, origin at its centre, (n, d) float64, m.
 
         Parameters
         ----------
         position_m : (n, d) float64, m
-
-        Returns
-        -------
-        (n, d) float64, m
         """
         return (position_m - self.centre_m) @ self.axes.T
 
     def distance_m(self, position_m: Array) -> Array:
-        """Signed distance of points from the block's surface, negative inside.
+        """Signed distance of points from the block's surface, negative inside, (n,) float64, m.
 
         Parameters
         ----------
         position_m : (n, d) float64, m
-
-        Returns
-        -------
-        (n,) float64, m
         """
         excess = np.abs(self.local(position_m)) - self.half_size_m
         outside = np.linalg.norm(np.maximum(excess, 0.0), axis=1)

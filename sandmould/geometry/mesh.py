@@ -33,7 +33,7 @@ class TriangleMesh:
         return MeshSearch(self.vertices_m, self.triangles)
 
     def distance_m(self, position_m: Array, reach_m: float = np.inf) -> Array:
-        """Signed distance of points from the surface, negative inside.
+        """Signed distance of points from the surface, negative inside, (n,) float64, m.
 
         Parameters
         ----------
@@ -41,25 +41,17 @@ class TriangleMesh:
         reach_m : float, m, optional
             Distances beyond it need not be exact: a point farther than this from the box round
             the mesh is given its distance from that box, which is no more than the true one.
-
-        Returns
-        -------
-        (n,) float64, m
         """
         return self._search.distance_m(position_m, reach_m)
 
     def holds(self, position_m: Array) -> NDArray[np.bool_]:
-        """Whether points are inside: where the surface goes round them once or more.
+        """Whether points are inside: where the surface goes round them once or more, (n,) bool.
 
         Far quicker than the sign of a distance.
 
         Parameters
         ----------
         position_m : (n, 3) float64, m
-
-        Returns
-        -------
-        (n,) bool
         """
         one = np.zeros(len(self.triangles), dtype=np.int64)
         return np.asarray(self._search.windings(position_m, one)[:, 0] > 0)

@@ -9,7 +9,6 @@ from sandmould.geometry.drawing_file import MeshFileError
 from sandmould.geometry.mesh import TriangleMesh
 from sandmould.geometry.mesh_crossing import check_crossings
 from sandmould.geometry.mesh_shells import extent, joined_sides, with_own_vertices
-from sandmould.geometry.mesh_simplify import shapes
 
 Array = NDArray[np.float64]
 Ints = NDArray[np.int64]
@@ -60,9 +59,9 @@ def without_slivers(drawn: TriangleMesh) -> TriangleMesh:
 def _is_as(drawn: TriangleMesh, places: Array, cells: Ints) -> bool:
     """Whether a surface is closed, of good triangles and nowhere too far from the drawn one."""
     mesh = TriangleMesh("coarser", places, cells)
-    least = min(_LEAST_SINE, shapes(drawn.corners_m)[1].min())
+    least = min(_LEAST_SINE, _shapes(drawn.corners_m)[1].min())
     off = abs(mesh.measure / drawn.measure - 1.0), abs(mesh.surface_m2 / drawn.surface_m2 - 1.0)
-    if max(off) > MEASURE_WITHIN or shapes(mesh.corners_m)[1].min() < least:
+    if max(off) > MEASURE_WITHIN or _shapes(mesh.corners_m)[1].min() < least:
         return False
     near = WITHIN * extent(drawn.vertices_m)
     if np.abs(drawn.distance_m(_sampled(mesh))).max() > near:
@@ -75,6 +74,16 @@ def _is_as(drawn: TriangleMesh, places: Array, cells: Ints) -> bool:
     except MeshFileError:
         return False
     return True
+
+
+def _shapes(corners: Array) -> tuple[Array, Array]:
+    """Unit normals of triangles, (n, 3), and the sine of the least angle of each, (n,)."""
+    a, b, c = corners.transpose(1, 0, 2)
+    normal = np.cross(b - a, c - a)
+    area2 = np.linalg.norm(normal, axis=1)
+    sides = np.sort([np.linalg.norm(e, axis=1) for e in (b - a, c - b, a - c)], axis=0)
+    safe = np.where(area2 > 0.0, area2, 1.0)
+    return normal / safe[:, None], area2 / np.maximum(sides[1] * sides[2], 1e-300)
 
 
 def _sampled(mesh: TriangleMesh) -> Array:

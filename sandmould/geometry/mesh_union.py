@@ -13,6 +13,8 @@ from scipy.sparse import coo_array
 from scipy.sparse.csgraph import connected_components
 
 from sandmould.geometry.drawing_file import MeshFileError
+from sandmould.geometry.mesh import TriangleMesh
+from sandmould.geometry.mesh_coarser import without_slivers
 from sandmould.geometry.mesh_cuts import CutShells, cut
 from sandmould.geometry.mesh_search import MeshSearch
 from sandmould.geometry.mesh_shells import (
@@ -24,7 +26,6 @@ from sandmould.geometry.mesh_shells import (
     sides_of,
     with_own_vertices,
 )
-from sandmould.geometry.mesh_simplify import simplified
 
 Array = NDArray[np.float64]
 Ints = NDArray[np.int64]
@@ -71,19 +72,12 @@ def united(vertices: Array, triangles: Ints, shell: Ints) -> tuple[Array, Ints]:
         except MeshFileError as fault:
             problem = fault
         else:
-            return _without_cuts(*with_own_vertices(pieces.vertices, kept, joined), vertices, near)
+            whole = TriangleMesh("union", *with_own_vertices(pieces.vertices, kept, joined))
+            plain = without_slivers(whole)  # LIGGGHTS refuses the narrow ones along a cut
+            return plain.vertices_m, plain.triangles
     where = "one at" + str(problem).rsplit("one at", 1)[-1]
     valid = "shells that overlap or touch clearly, or lie apart"
     raise MeshFileError(f"{valid}; their union leaves open edges, {where}")
-
-
-def _without_cuts(
-    cut_vertices: Array, triangles: Ints, vertices: Array, near: float
-) -> tuple[Array, Ints]:
-    """Take away vertices that only a line on a flat face has left."""
-    drawn = set(map(tuple, vertices.tolist()))
-    new = [n for n, place in enumerate(cut_vertices.tolist()) if tuple(place) not in drawn]
-    return simplified(cut_vertices, triangles, new, near * extent(vertices))
 
 
 def _bounds(pieces: CutShells, search: MeshSearch, shell: Ints, beside: float) -> NDArray[np.bool_]:

@@ -12,7 +12,7 @@ LEAF = 4
 
 @njit()
 def windings(points, corners, shell, shells, low, high):  # type: ignore[no-untyped-def]
-    """Winding number of each shell round each point.
+    """Winding number of each shell round each point, (n, shells) int64.
 
     A ray goes up from the point; a triangle that it leaves through counts 1, one that it enters
     through -1. Edges are taken half open and always from the same end, so that a ray through an
@@ -28,10 +28,6 @@ def windings(points, corners, shell, shells, low, high):  # type: ignore[no-unty
     shells : int
     low, high : (nodes, 3) float64
         Boxes of the tree, as :class:`sandmould.geometry.mesh_search.MeshSearch` has them.
-
-    Returns
-    -------
-    (n, shells) int64
     """
     leaves = (len(low) + 1) // 2
     nodes = np.empty(64, np.int64)

@@ -51,7 +51,6 @@ def step_tetrahedra(path: Path, size_m: float) -> tuple[Array, Ints]:
 
     Parameters
     ----------
-    path : Path
     size_m : float, m
         Longest side of an element, about.
 

@@ -21,7 +21,7 @@ class Outline:
     """(k, 2) float64, m: counter-clockwise; the last is joined to the first."""
 
     def distance_m(self, position_m: Array, reach_m: float = np.inf) -> Array:
-        """Signed distance of points from the outline, negative inside.
+        """Signed distance of points from the outline, negative inside, (n,) float64, m.
 
         Parameters
         ----------
@@ -29,10 +29,6 @@ class Outline:
         reach_m : float, m, optional
             Distances beyond it need not be exact: they are never below it, nor above the true
             ones.
-
-        Returns
-        -------
-        (n,) float64, m
         """
         start_m, end_m = self.vertices_m, np.roll(self.vertices_m, -1, axis=0)
         beyond_m = np.maximum(start_m.min(axis=0) - position_m, position_m - start_m.max(axis=0))

@@ -28,15 +28,11 @@ class Revolved:
     distance from it. Edges on the axis bound nothing."""
 
     def distance_m(self, position_m: Array) -> Array:
-        """Signed distance of points from the surface, negative inside.
+        """Signed distance of points from the surface, negative inside, (n,) float64, m.
 
         Parameters
         ----------
         position_m : (n, 3) float64, m
-
-        Returns
-        -------
-        (n,) float64, m
         """
         relative_m = position_m - self.origin_m
         along_m = relative_m @ self.axis

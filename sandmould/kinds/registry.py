@@ -22,13 +22,6 @@ _OF_SCENARIO: dict[type, Kind[Any]] = {kind.scenario: kind for kind in KINDS.val
 def kind_named(name: object, file: str = "") -> Kind[Any]:
     """The kind of a study by its name.
 
-    Parameters
-    ----------
-    name : object
-        As a file states it.
-    file : str
-        The file, for the message.
-
     Raises
     ------
     BadInputError

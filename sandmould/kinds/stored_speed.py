@@ -41,12 +41,7 @@ class StoredSpeed(ABC, Generic[SceneT]):
         return stored
 
     def stored(self, scenario: SceneT) -> float | None:
-        """Work a second of one core as measured before; None where it was not. Starts nothing.
-
-        Parameters
-        ----------
-        scenario : scenario of the kind
-        """
+        """Work a second of one core as measured before; None where it was not. Starts nothing."""
         try:
             found = float(self.file(scenario).read_text(encoding="utf-8"))
         except (OSError, ValueError):  # it was not measured, or the file is damaged
@@ -54,18 +49,7 @@ class StoredSpeed(ABC, Generic[SceneT]):
         return self.rate(scenario, found) if 0.0 < found < math.inf else None
 
     def measured(self, scenario: SceneT, results: Path) -> float | None:
-        """The same, measured now and stored where it was not before.
-
-        Parameters
-        ----------
-        scenario : scenario of the kind
-        results : Path
-            Folder of all results.
-
-        Returns
-        -------
-        float or None
-            None where nothing could be measured: the study's own runs will say why.
+        """The same, measured now and stored where it was not before; None where it cannot be.
 
         Raises
         ------

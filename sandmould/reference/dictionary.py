@@ -38,12 +38,6 @@ def study_text(study: Mapping[str, Any]) -> str:
 def write_study_file(path: Path, text: str) -> None:
     """Write a study's file, unless it is one that was written by hand.
 
-    Parameters
-    ----------
-    path : Path
-    text : str
-        Of ``study_text``.
-
     Raises
     ------
     BadInputError

@@ -36,13 +36,7 @@ class InstallationPart:
 
 
 def findings(folder: Path) -> list[InstallationPart]:
-    """Look at the program, its engines, the machine, the cluster and the disk.
-
-    Parameters
-    ----------
-    folder : Path
-        Where results would go.
-    """
+    """Look at the program, its engines, the machine, the cluster and the disk."""
     return [
         InstallationPart("sandmould", f"{metadata.version('sandmould')} ({commit()})"),
         InstallationPart("Python", f"{platform.python_version()}, {platform.platform(terse=True)}"),

@@ -56,14 +56,6 @@ _GATE_M = 0.01
 def write_new_study(name: str, path: Path, given: dict[str, Any]) -> Plan:
     """Write a study and what it needs, and check it first as the plan does.
 
-    Parameters
-    ----------
-    name : str
-        Of its template.
-    path : Path
-    given : dict
-        Options of ``sandmould new``, without those that were not given.
-
     Raises
     ------
     BadInputError

@@ -50,13 +50,7 @@ class AgreementPages:
 
 
 def agreement_pages(collected: Collected, study: Study) -> AgreementPages | None:
-    """Draw the comparisons of a study.
-
-    Returns
-    -------
-    AgreementPages or None
-        None where the study compares nothing.
-    """
+    """Draw the comparisons of a study; None where it compares nothing."""
     compared = compare_study(collected.summary, collected.keys, study)
     if not compared:
         return None

@@ -66,16 +66,7 @@ def optimum_headline(
 ) -> tuple[str, bool]:
     """Say in one sentence where the optimum of a refined study lies.
 
-    Parameters
-    ----------
-    pages : OptimumPages
-    robustness : RobustnessPages, optional
-        Its controls.
-    answer : Answer
-    summary : DataFrame
-        One row a run of the sweep.
-    has_speed : bool
-        Whether the study gives the wave speed of the real sand.
+    ``has_speed``: whether the study gives the wave speed of the real sand.
     """
     optimum, advised = pages.optimum, pages.recommendation
     if optimum is None:
@@ -122,14 +113,7 @@ def _as_drive(drive: Mapping[str, float] | None) -> BoxDrive | None:
 
 
 def figures_of(answer: Answer, summary: pd.DataFrame) -> tuple[KeyNumber, ...]:
-    """The one setting that suits the question in words of the machine; nothing where several do.
-
-    Parameters
-    ----------
-    answer : Answer
-    summary : DataFrame
-        One row a run of the sweep.
-    """
+    """The one setting that suits the question in words of the machine; nothing where several do."""
     if len(answer.wanted) != 1 or answer.beside:
         return ()
     return _figures(answer.verdict.setting(answer.wanted[0]), answer, summary)
@@ -166,14 +150,7 @@ def optimum_choice(
 ) -> tuple[KeyNumber, ...]:
     """The optimum between the settings, in words of the machine; nothing where it is not to be set.
 
-    Parameters
-    ----------
-    pages : OptimumPages
-    summary : DataFrame
-        One row a run of the sweep.
-    verdict : Verdict
-    is_artefact : bool
-        Whether its controls show it to be none of the sand's.
+    ``is_artefact``: whether its controls show it to be none of the sand's.
     """
     optimum, advised = pages.optimum, pages.recommendation
     if optimum is None or is_artefact or (advised is not None and advised.interval_hz is None):

@@ -73,7 +73,6 @@ def bed_mode(
 
     Parameters
     ----------
-    scenario : Scenario
     summary : DataFrame
         One row a run; its beds' heights count, the expected one where it has none.
     responses : sequence of Response

@@ -52,20 +52,7 @@ def bending_pages(
     verdict: Verdict,
     pictured_run: str,
 ) -> dict[str, Any]:
-    """Draw what ``bending.html`` shows of a study's pattern.
-
-    Parameters
-    ----------
-    study_folder : Path
-    href : str
-        Address of that folder, seen from the report.
-    scenario : Scenario
-        Of the run that is shown.
-    collected : Collected
-    verdict : Verdict
-    pictured_run : str
-        Name of that run.
-    """
+    """Draw what ``bending.html`` shows of a study's pattern."""
     verdicts: dict[str, LoopVerdict] = {}
     for run in collected.summary[RUN]:
         loop_verdict = verdict_of(study_folder / "runs" / str(run))
@@ -168,10 +155,6 @@ def paper_sentences(scenario: Scenario, collected: Collected, pictured_run: str)
 
     Parameters
     ----------
-    scenario : Scenario
-        Of the run that is shown.
-    collected : Collected
-        Of the sweep.
     pictured_run : str
         Whose setting is judged, by the mean over its fillings.
 

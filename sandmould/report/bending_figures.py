@@ -61,7 +61,6 @@ def coupling_map(collected: Collected, states: Mapping[str, State]) -> CouplingM
 
     Parameters
     ----------
-    collected : Collected
     states : mapping of run to state
         Of the runs that can be judged.
 
@@ -147,12 +146,6 @@ _STYLES = {"filled": ("after filling", "#D55E00"), "final": ("at the end", "#007
 def draw_outlines(run_folder: Path, scenario: Scenario) -> tuple[str, str]:
     """Draw the shapes of one run, in 3D cut through the middle; displacements are not magnified.
 
-    Parameters
-    ----------
-    run_folder : Path
-    scenario : Scenario
-        With a pattern among its obstacles.
-
     Returns
     -------
     (str, str)
@@ -183,14 +176,9 @@ def draw_outlines(run_folder: Path, scenario: Scenario) -> tuple[str, str]:
 
 
 def draw_distances(run_folder: Path, scenario: Scenario) -> str:
-    """Draw the bent surface at the end of a run, coloured by its distance from the drawing.
+    """Draw the bent surface at a run's end by its distance from the drawing; empty without one.
 
     The colours end at the tolerance, where there is one; what is beyond it is black.
-
-    Returns
-    -------
-    str
-        PNG as a ``data:`` address; empty where the run left no surface.
     """
     path = run_folder / "exports" / "pattern_final.vtu"
     if not path.is_file() or scenario.pattern is None:

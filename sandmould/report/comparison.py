@@ -241,19 +241,7 @@ def _read(name: str, folder: Path) -> ComparedStudy:
 
 
 def write_comparison(comparison: SideBySide, out: Path) -> Path:
-    """Write the page, and beside it its picture as SVG.
-
-    Parameters
-    ----------
-    comparison : SideBySide
-    out : Path
-        The HTML file; it opens offline.
-
-    Returns
-    -------
-    Path
-        The picture.
-    """
+    """Write the page, and beside it its picture as SVG."""
     environment = page_environment()
     chart = comparison.chart()
     page = environment.get_template("comparison.html").render(

@@ -82,22 +82,7 @@ def runs_by_setting(summary: pd.DataFrame, keys: Sequence[str]) -> dict[str, pd.
 def time_chart(
     curves: pd.DataFrame, summary: pd.DataFrame, verdict: Verdict, keys: Sequence[str], measure: str
 ) -> Chart | None:
-    """A measure against the time of vibration: thin for each run, thick for a setting's mean.
-
-    Parameters
-    ----------
-    curves, summary : DataFrame
-        From :func:`sandmould.study.collect.collect`.
-    verdict : Verdict
-    keys : sequence of str
-    measure : str
-        A column of ``curves``.
-
-    Returns
-    -------
-    Chart or None
-        None where no run has the measure during vibration.
-    """
+    """A measure over the time of vibration: each run thin, means thick; None if unknown."""
     if measure not in curves or not curves[measure].notna().any():
         return None
     shaken = during_vibration(curves)

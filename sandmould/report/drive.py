@@ -24,12 +24,7 @@ _COLUMNS = (DISPLACEMENT, VELOCITY, ACCELERATION)
 def drive_of(scenario: Scenario, runs: pd.DataFrame) -> BoxDrive | None:
     """Drive of the first vibration of a setting; None where there is none, or none was measured.
 
-    Parameters
-    ----------
-    scenario : Scenario
-        At the setting.
-    runs : DataFrame
-        Rows of the summary at the setting: a table on mounts moves as it was measured.
+    ``runs``: rows of the summary at the setting: a table on mounts moves as it was measured.
     """
     if not scenario.vibrations:
         return None
@@ -50,8 +45,6 @@ def drive_at(
     ----------
     summary : DataFrame
         One row a run.
-    keys : sequence of str
-        Swept keys, all numbers.
     setting : mapping of str to float
         A value of each key.
 

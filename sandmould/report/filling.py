@@ -41,17 +41,7 @@ class FillingPages:
 def filling_pages(
     study: Study, collected: Collected, verdict: Verdict, scenario: Scenario
 ) -> FillingPages | None:
-    """Say how a cavity fills; None for studies of something else.
-
-    Parameters
-    ----------
-    study : Study
-    collected : Collected
-        Of the sweep.
-    verdict : Verdict
-    scenario : Scenario
-        At the best setting.
-    """
+    """Say how a cavity fills; None for studies of something else."""
     best, measure = verdict.best, verdict.measure
     if best is None or not scenario.vibrations or not measure.endswith("_fill_fraction"):
         return None

@@ -41,8 +41,6 @@ def stability_map(summary: pd.DataFrame, keys: Sequence[str]) -> str:
     ----------
     summary : DataFrame
         Runs that ended, each with its classification.
-    keys : sequence of str
-        Swept keys.
 
     Returns
     -------
@@ -151,8 +149,6 @@ def pressure_history(
 
     Parameters
     ----------
-    folder : Path
-        Of the run.
     setting, rating : str
         What is swept, and how stable the run is.
     ideal_pa : mapping of probe to float, Pa

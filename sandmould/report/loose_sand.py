@@ -26,16 +26,7 @@ def loose_sand_pages(
 ) -> dict[str, Any] | None:
     """Say and draw where sand lies loose in a run; None where that is not sought.
 
-    Parameters
-    ----------
-    folder : Path
-        Of the study.
-    run : str
-        The one that is pictured.
-    scenario : Scenario
-        Its grains are the measure of a zone.
-    height_m : float, m
-        Up to which the box is shown.
+    ``scenario``: its grains are the measure of a zone.
     """
     if not run or not seeks_loose_sand(scenario):
         return None

@@ -63,10 +63,6 @@ def optimum_pages(
 
     Parameters
     ----------
-    study_folder : Path
-    study : Study
-    summary : DataFrame
-        One row a run of the sweep and its rounds.
     robustness : RobustnessPages, optional
         Its verdict comes first where the optimum is an artefact, or where no frequency is
         recommended.

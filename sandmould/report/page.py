@@ -37,12 +37,7 @@ from sandmould.report.curves import objective_charts
 from sandmould.report.estimate_section import EstimatePages, estimate_figures, estimate_pages
 from sandmould.report.kinds.kind import Findings, KindPages
 from sandmould.report.kinds.registry import report_of
-from sandmould.report.method import (
-    Row,
-    own_measures_method,
-    provenance_rows,
-    statistics_method,
-)
+from sandmould.report.method import own_measures_method, provenance_rows, statistics_method
 from sandmould.report.optimum import (
     OptimumPages,
     effort_sentence,
@@ -227,10 +222,10 @@ def _render(
         charts = tuple(with_surface(c, optimum.optimum, page.study) for c in charts)
     provenance = [read_provenance(page.study_folder / "runs" / str(r)) for r in summary[RUN]]
     of_kind = kind.pages(page, film_budget_bytes)
-    method: tuple[Row, ...] = (
+    method: tuple[Note, ...] = (
         *of_kind.method,
         *own_measures_method(page.study.own_measures),
-        statistics_method(
+        *statistics_method(
             page.study.objective, of_kind.ends, kind_named(page.study.kind).draws_by_lot
         ),
     )

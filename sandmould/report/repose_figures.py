@@ -89,11 +89,8 @@ def draw_map(
 
     Parameters
     ----------
-    emulator : Emulator
     keys : tuple of str
         The second goes along x, as in Figure 12 of the paper.
-    title : str
-        Of the measure.
     points : (n, 2) float64
         Values of the keys of the runs.
     sands : sequence of CalibratedSand
@@ -165,17 +162,7 @@ class Heap:
 def steepest_heaps(
     study_folder: Path, summary: pd.DataFrame, verdict: Verdict, scenario: Scenario
 ) -> tuple[Heap, ...]:
-    """Draw runs with the least, the middle and the steepest slope; none without a level gate.
-
-    Parameters
-    ----------
-    study_folder : Path
-    summary : DataFrame
-        Of the sweep.
-    verdict : Verdict
-    scenario : Scenario
-        Of any run.
-    """
+    """Draw runs with the least, the middle and the steepest slope; none without a level gate."""
     if scenario.gate is None or not scenario.gate.is_level:
         return ()
     values = usable_values(summary, verdict.measure).dropna().sort_values()

@@ -55,17 +55,10 @@ def sand_pages(
 
     Parameters
     ----------
-    study_folder : Path
     scenario : Scenario
         Of the run that is shown: the best one.
-    collected : Collected
-    verdict : Verdict
-    film_budget_bytes : int
-        Most that the film of one run may weigh.
     href : str
         Address of the study's folder, seen from the report.
-    own_measures : iterable of str, optional
-        Names of the user's own measures.
 
     Returns
     -------

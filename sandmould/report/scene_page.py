@@ -25,11 +25,10 @@ from sandmould.drawing.sphere_film import SphereFilm, bare_film, sphere_frames
 from sandmould.drawing.sphere_scene import solid_scene, sphere_scene
 from sandmould.drawing.templates import page_environment
 from sandmould.engines.snapshot import Snapshot
-from sandmould.geometry.geometry import Bore, Cavity
 from sandmould.report.kinds.solidification import distance_from
-from sandmould.report.method import Row
 from sandmould.runs.files import replaced
-from sandmould.runs.formatting import listed, number
+from sandmould.runs.formatting import listed
+from sandmould.runs.templates import Note, notes
 from sandmould.scenario.casting.solidification import Solidification
 from sandmould.scenario.likely_bed import LikelyBed, likely_bed
 from sandmould.scenario.placement import plan_counts
@@ -52,7 +51,6 @@ def draw_scene_file(scenario: Scenario | Solidification, title: str, run: str, o
 
     Parameters
     ----------
-    scenario : Scenario or Solidification
     title, run : str
         What the page is headed with.
     out : Path
@@ -156,9 +154,9 @@ def _of_casting(scenario: Solidification, run: str) -> tuple[Figure, dict[str, A
         "is_cast": True,
         "dimension": scenario.dimensions,
         "facts": (
-            Row("box", f"{sides} mm"),
-            Row("cast", listed([solid.name for solid in solids], most=8)),
-            Row("elements", f"{1e3 * scenario.element_m:g} mm"),
+            Note("box", f"{sides} mm"),
+            Note("cast", listed([solid.name for solid in solids], most=8)),
+            Note("elements", f"{1e3 * scenario.element_m:g} mm"),
         ),
         "slice_note": "",
         "vibrates": False,
@@ -182,37 +180,18 @@ def _count(number: int) -> str:
     return f"{number:,}".replace(",", "\u00a0")
 
 
-def _facts(s: Scenario) -> tuple[Row, ...]:
+def _facts(s: Scenario) -> tuple[Note, ...]:
     """What is drawn, in numbers."""
-    d, counts = s.dimension, plan_counts(s)
-    sizes = [f"{1e3 * c.diameter_m:.3g} mm" for c in s.sand.classes(d)]
-    box = (
-        (s.box.width_m, s.box.height_m)
-        if d == 2
-        else (s.box.width_m, s.box.depth_m, s.box.height_m)
+    counts = plan_counts(s)
+    return notes(
+        "scene_facts.j2",
+        scene=s,
+        grains=_count(sum(counts)),
+        counts=[_count(n) for n in counts],
+        sizes=[f"{1e3 * each.diameter_m:.3g} mm" for each in s.sand.classes(s.dimension)],
+        names=list(dict.fromkeys(o.name.replace("_", " ") for o in s.obstacles)),
+        spaces=[*s.scene.bores, *s.scene.cavities],
     )
-    rows = [
-        Row("box", " × ".join(f"{1e3 * side:g}" for side in box) + " mm"),
-        Row("grains", f"{_count(sum(counts))} in layers of {listed([_count(n) for n in counts])}"),
-        Row("diameters", listed(sizes, most=len(sizes))),
-    ]
-    if s.obstacles:
-        names = [o.name.replace("_", " ") for o in s.obstacles]
-        rows.append(Row("in the box", listed(list(dict.fromkeys(names)), most=8)))
-    spaces: list[Bore | Cavity] = [*s.scene.bores, *s.scene.cavities]
-    for space in spaces:
-        name = space.name.replace("_", " ")
-        rows.append(Row(f"cavity {name}", f"{1e3 * space.length_m:.4g} mm deep"))
-    if (pouring := s.fill.vibration) is not None:
-        moves = f"{number(pouring.frequency_hz)} Hz, {pouring.peak_acceleration_g:.3g} g"
-        rows.append(Row("vibration of the fill", f"{moves}, a layer every {pouring.layer_s:g} s"))
-    for stage in s.vibrations:
-        along = ", ".join(f"{x:.3g}" for x in stage.unit_direction(d))
-        moves = f"{number(stage.frequency_hz)} Hz along ({along}), {number(stage.duration_s)} s"
-        if stage.unbalance is None:
-            moves += f", ±{1e3 * stage.amplitude_m:.3g} mm, {stage.peak_acceleration_g:.3g} g"
-        rows.append(Row("vibration", moves))
-    return tuple(rows)
 
 
 def _arrow(s: Scenario) -> list[list[float]]:

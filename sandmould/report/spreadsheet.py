@@ -33,17 +33,7 @@ def write_spreadsheet(study_folder: Path, out: Path) -> None:
 
     Numbers are cells of numbers, whatever the language of the program that opens them.
 
-    Parameters
-    ----------
-    study_folder : Path
-        ``results/<study>`` with its collected tables.
-    out : Path
-        The ``.xlsx`` file.
-
-    Raises
-    ------
-    OSError, ValueError
-        When a collected table cannot be read.
+    ``study_folder``: ``results/<study>`` with its collected tables.
     """
     objective, collected = read_study(study_folder).objective, read_collected(study_folder)
     keys, summary = collected.keys, collected.of_sweep.summary

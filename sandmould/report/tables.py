@@ -105,7 +105,6 @@ def share_of_what_fits(
 
     Parameters
     ----------
-    summary : DataFrame
     measure : str
         The fill of that space.
     values : mapping of str to object, optional
@@ -126,13 +125,7 @@ def share_of_what_fits(
 
 
 def key_numbers(summary: pd.DataFrame) -> tuple[KeyNumber, ...]:
-    """Runs that finished, size, cost and health of the runs.
-
-    Returns
-    -------
-    tuple of KeyNumber
-        Without those whose data are missing.
-    """
+    """Runs that finished, size, cost and health of the runs, as far as their data are there."""
     numbers: list[KeyNumber] = []
     complete = summary[finished(summary)]
     checks = PART in summary and (summary[PART] != SWEEP).any()
@@ -170,11 +163,7 @@ def _total(summary: pd.DataFrame, column: str, how: str) -> float | None:
 def settings_table(verdict: Verdict, drives: Mapping[str, BoxDrive]) -> Table:
     """Every setting with its mean, and the best against it.
 
-    Parameters
-    ----------
-    verdict : Verdict
-    drives : mapping of str to BoxDrive
-        That of the vibrating table at a setting, by label.
+    ``drives``: that of the vibrating table at a setting, by label.
     """
     drive = ("amplitude, mm", "velocity, mm/s", "accel., g") if drives else ()
     columns = (
@@ -257,21 +246,7 @@ _COST = (
 def runs_table(
     summary: pd.DataFrame, keys: Sequence[str], verdict: Verdict, runs_href: str
 ) -> Table:
-    """Every run with its parameters, outcome, objective and cost.
-
-    Parameters
-    ----------
-    summary : DataFrame
-    keys : sequence of str
-    verdict : Verdict
-    runs_href : str
-        Address of the folder of runs, seen from the report.
-
-    Returns
-    -------
-    Table
-        Runs that are left out of the verdict are marked and say why.
-    """
+    """Every run with its parameters, outcome, objective and cost; why one is left out is said."""
     cost = [c for c in _COST if c[0] in summary]
     blocks = [c for c in (REPLICATE, SEED) if c in summary]
     has_value = verdict.measure in summary

@@ -15,15 +15,7 @@ from sandmould.study.collect import Collected
 def measure_curves(
     collected: Collected, verdict: Verdict, measures: Sequence[str]
 ) -> tuple[Chart, ...]:
-    """Charts of measures against time, those that no run has left out.
-
-    Parameters
-    ----------
-    collected : Collected
-    verdict : Verdict
-    measures : sequence of str
-        Columns of the curves.
-    """
+    """Charts of measures against time, those that no run has left out."""
     drawn, part = drawn_part(collected, verdict)
     every = (
         time_chart(drawn.curves, drawn.summary, part, collected.keys, each) for each in measures

@@ -25,11 +25,7 @@ class CheckpointFile:
     def __init__(self, path: Path, computed_hash: str) -> None:
         """Belong to a run.
 
-        Parameters
-        ----------
-        path : Path
-        computed_hash : str
-            Tells this run from one of another scenario or solver.
+        ``computed_hash``: tells this run from one of another scenario or solver.
         """
         self._path, self._hash = path, computed_hash
         self._due_s = time.monotonic() + INTERVAL_S

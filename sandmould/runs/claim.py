@@ -60,7 +60,6 @@ class Claim:
 
         Parameters
         ----------
-        folder : Path
         alone : bool
             Whether no other process of this machine works there, since the caller holds its flock:
             whoever of this machine claimed it has ended then.
@@ -155,12 +154,8 @@ class Claim:
 def owner_of(folder: Path, here: bool = False) -> Owner | None:
     """Who claims a folder and has renewed that lately; None where nobody has.
 
-    Parameters
-    ----------
-    folder : Path
-    here : bool
-        Whether processes of this machine count. Where flock works, that is the better answer: one
-        that was killed just now does not hold it.
+    ``here``: whether processes of this machine count. Where flock works, that is the better answer:
+    one that was killed just now does not hold it.
     """
     owner, age_s = _look(folder / CLAIM_FILE, time.time())
     if owner is None or age_s > STALE_S:

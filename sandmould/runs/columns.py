@@ -94,14 +94,7 @@ def finished(summary: pd.DataFrame) -> pd.Series[bool]:
 
 
 def total_s(summary: pd.DataFrame, column: str) -> float:
-    """Time of all runs and of the fills that they share; NaN where no run says it.
-
-    Parameters
-    ----------
-    summary : DataFrame
-    column : str
-        ``WALL_S`` or ``CPU_S``.
-    """
+    """Time of all runs and of the fills that they share; NaN where no run says it."""
     of_fills = {WALL_S: FILL_WALL_S, CPU_S: FILL_CPU_S}[column]
     if column not in summary:
         return math.nan

@@ -33,11 +33,7 @@ Step = Literal["computed", "measured"]
 def files_below(folder: Path, names: tuple[str, ...] | None = None) -> dict[str, int]:
     """Size of every file, in bytes, by its path from the folder.
 
-    Parameters
-    ----------
-    folder : Path
-    names : tuple of str, optional
-        Files and folders that count; all unless given.
+    ``names``: files and folders that count; all unless given.
     """
     places = folder.iterdir() if names is None else (folder / name for name in names)
     return {
@@ -69,10 +65,7 @@ def write_manifest(
 
     Parameters
     ----------
-    folder : Path
     step : str
-    sizes : mapping of str to int
-        Bytes of each file.
     origin : mapping, optional
         Provenance of what was computed.
     cost : mapping, optional
@@ -135,7 +128,6 @@ def damage(folder: Path, sizes: Mapping[str, Any]) -> str:
 
     Parameters
     ----------
-    folder : Path
     sizes : mapping of str to int
         Bytes of each file, by its path from the folder.
     """

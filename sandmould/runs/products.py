@@ -112,15 +112,7 @@ def finish(
     begins anew, since its tables are no longer beside its checkpoint. Where it comes from, its cost
     and sizes and hashes of all products are written down in ``products.json``.
 
-    Parameters
-    ----------
-    folder : Path
-        Of the run.
-    products : sequence of str
-        Files and folders of ``folder/work`` that are kept.
-    outcome : RunOutcome
-    cost : Cost
-    provenance : dict
+    ``products``: files and folders of ``folder/work`` that are kept.
     """
     work = folder / "work"
     for name in products:

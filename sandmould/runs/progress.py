@@ -34,13 +34,10 @@ class Progress:
 
         Parameters
         ----------
-        name : str
-            Of the run.
         work : Path
             Takes ``progress.json``.
         expected : float or None
             Work of the whole run in its unit; None where nobody knows.
-        unit : str
         """
         self._name = name
         self._path = work / "progress.json"

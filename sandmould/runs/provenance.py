@@ -23,8 +23,6 @@ def provenance_of(scenario: Section, seed: int, template_hash: str, command: str
 
     Parameters
     ----------
-    scenario : Section
-    seed : int
     template_hash : str
         Hash of what turns the scenario into a deck, and of our code where it computes.
     command : str

@@ -48,11 +48,7 @@ def read_tables(
     Files with one head are parsed together, since a reader for each costs far more than its rows.
     A file that may need a reader of its own, such as one that was cut short, gets it.
 
-    Parameters
-    ----------
-    paths : sequence of Path
-    check : callable
-        Gives a table as it is kept; raises what a file cannot be read for.
+    ``check``: gives a table as it is kept; raises what a file cannot be read for.
     """
     alike: dict[str, list[tuple[int, str]]] = {}
     alone: list[int] = []

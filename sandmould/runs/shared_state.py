@@ -43,8 +43,6 @@ def lay_checkpoint(
     ----------
     source : Path
         Checkpoint folder.
-    work : Path
-        Of the run, where the tables lie already: the checkpoint comes last, as a whole.
     owner_hash : str
         Hash of the scenario that the checkpoint must be of.
     run_hash : str
@@ -54,8 +52,6 @@ def lay_checkpoint(
         the grains and the largest overlap of the whole.
     stages : int
         That the other one has computed.
-    fill : str
-        Its name.
 
     Raises
     ------

@@ -67,8 +67,6 @@ class Box(Section):
         Parameters
         ----------
         points_m : (n, d) float64, m
-        dimension : int
-        slack : float, optional
         """
         size_m = np.array(self.size_m(dimension))
         slack_m = slack * size_m.max()
@@ -289,16 +287,7 @@ def box_walls(box: Box, dimension: int) -> list[Wall]:
 
 
 def piston_wall(piston: Piston, box: Box, dimension: int, way_m: float) -> Wall:
-    """The wall that moves as a piston, once it has gone a way.
-
-    Parameters
-    ----------
-    piston : Piston
-    box : Box
-    dimension : int
-    way_m : float, m
-        Into the box.
-    """
+    """The wall that moves as a piston, once it has gone a way."""
     up = np.eye(dimension)[-1]
     walls = [*box_walls(box, dimension), Wall("top", up * box.height_m, -up)]
     (wall,) = (wall for wall in walls if wall.name == piston.wall)

@@ -88,18 +88,11 @@ CAVITY_KINDS = {2: ("box", "polygon"), 3: ("box", "cylinder", "mesh")}
 
 
 def inward(cavity: AnyCavity, dimension: int, key: str) -> Array:
-    """Unit vector from the side that a cavity opens to into it.
+    """Unit vector from the side that a cavity opens to into it, (d,) float64.
 
     Parameters
     ----------
     cavity : cavity of any kind
-    dimension : int
-    key : str
-        Key path of the cavity, for messages.
-
-    Returns
-    -------
-    (d,) float64
 
     Raises
     ------
@@ -126,9 +119,6 @@ def cavity_space(cavity: AnyCavity, dimension: int, key: str) -> Cavity:
     Parameters
     ----------
     cavity : cavity of any kind
-    dimension : int
-    key : str
-        Key path of the cavity, for messages.
 
     Raises
     ------
@@ -173,10 +163,8 @@ def cavity_grid(
 
     Parameters
     ----------
-    cavity : Cavity
     spacing_m : float, m
         Longest edge of a cell; longer where there would be too many.
-    most_points : int
     margin_m : float, m, optional
         How far the grid goes beyond the box round the cavity.
     """

@@ -54,12 +54,7 @@ class ContactLaw(Section):
     def dashpot_ratio(self, mass_kg: float, lag_s: float) -> float:
         """Damping ratio that a dashpot is given, c'/C_cr with c' = c/(1 + c lag/(4 m)).
 
-        Parameters
-        ----------
-        mass_kg : float
-            m of eq. (21): m1 m2/(m1 + m2) of two grains, m1 at a wall.
-        lag_s : float
-            As ``Contact.lag_s`` gives it.
+        ``mass_kg``: m of eq. (21): m1 m2/(m1 + m2) of two grains, m1 at a wall.
         """
         omega = math.sqrt(self.normal_stiffness_n_m / mass_kg)
         return self.damping_ratio / (1 + 0.5 * self.damping_ratio * omega * lag_s)
@@ -171,16 +166,7 @@ class Contact(Section):
         return step_s if self.dashpot == "corrected" else 0.0
 
     def parameters(self, law: ContactLaw, dimension: int, step_s: float) -> dict[str, Any]:
-        """Give all that one law computes with, by the short names of decks and solvers.
-
-        Parameters
-        ----------
-        law : ContactLaw
-            One of the two.
-        dimension : int
-        step_s : float
-            Time step.
-        """
+        """Give all that one law computes with, by the short names of decks and solvers."""
         return {
             **{symbol: getattr(law, key) for symbol, key in SYMBOLS.items()},
             "clip_total": self.no_tension == "total",
@@ -218,12 +204,7 @@ def wave_speed_m_s(sand: Sand, contact: Contact, dimension: int) -> float:
     spheres. A bed has more contacts a grain, in all directions, and its own speed
     (docs/hard_sand.md).
 
-    Parameters
-    ----------
-    sand : Sand
-    contact : Contact
-        Springs as they are computed with.
-    dimension : int
+    ``contact``: springs as they are computed with.
     """
     diameter_m = sand.mass_median_diameter_m
     mass_kg = sand.grain_mass_kg(diameter_m, dimension)

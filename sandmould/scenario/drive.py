@@ -67,7 +67,6 @@ def steady_drive(
 
     Parameters
     ----------
-    stage : VibrationStage
     displacement_m, phase_deg : (p,) float64, m and degrees
         Amplitude and lag of each period of the stage so far, from its first on.
 

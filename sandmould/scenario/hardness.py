@@ -54,15 +54,10 @@ def column_speed_m_s(mode_hz: float, depth_m: float) -> float:
 
 
 def bed_hardness(scenario: Scenario) -> Hardness | None:
-    """Hardness of a scene's filled bed, by the springs that it is computed with.
+    """Hardness of a scene's bed, by the springs as they are computed; None where nothing presses.
 
     The pressure at the foot is rho phi g H: the sand's density times the solid fraction that turns
     a layer's height into grains, over the depth of the bed that is expected.
-
-    Returns
-    -------
-    Hardness or None
-        None where nothing presses: without sand or gravity.
     """
     depth_m = predicted_bed_depth_m(scenario, plan_counts(scenario))
     sand, laws = scenario.sand, scenario.laws

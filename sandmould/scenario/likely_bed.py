@@ -49,12 +49,8 @@ class LikelyBed:
 def likely_bed(s: Scenario, cut_m: float | None = None) -> LikelyBed:
     """Fill the box of a scenario with as many grains of each size as are planned.
 
-    Parameters
-    ----------
-    s : Scenario
-    cut_m : float, m, optional
-        y at which the slice begins of a box with too many grains; it lies in the middle unless
-        given.
+    ``cut_m``: y at which the slice begins of a box with too many grains; it lies in the middle
+    unless given.
     """
     counts, d = plan_counts(s), s.dimension
     total, rng = sum(counts), np.random.default_rng([s.seed, 0])

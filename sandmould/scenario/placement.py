@@ -194,12 +194,8 @@ def _layer_rng(s: Scenario, number: int) -> np.random.Generator:
 def plan_layer(s: Scenario, number: int, count: int) -> PlannedLayer:
     """Place one layer's grains by random sequential addition, largest first.
 
-    Parameters
-    ----------
-    s : Scenario
-    number : int
-        Number of the layer, or of the portion of one, from 1; with the seed it fixes the draw.
-    count : int
+    ``number``: number of the layer, or of the portion of one, from 1; with the seed it fixes the
+    draw.
     """
     if s.fill.grains and number == 1:
         return placed_grains(s)

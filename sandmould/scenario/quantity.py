@@ -41,12 +41,8 @@ def quantity(
     ----------
     default : any
         Default value; ``...`` when the user must give one.
-    description : str
-        What the value means, in one sentence.
     unit : str
         SI unit as written in decks and the schema; ``1`` for a pure number.
-    source : str
-        Where the default comes from.
     first : any
         The default that the key had first, where it has another one now: results of scenes that
         leave the key alone are then those of another value, and their identity changes.

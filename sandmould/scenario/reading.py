@@ -35,14 +35,6 @@ def read_planned(path: Path, name: str) -> Tree:
 def read_yaml(path: Path, name: str, text: str | None = None) -> Tree:
     """Read one YAML file that must hold a mapping.
 
-    Parameters
-    ----------
-    path : Path
-    name : str
-        The file's name in messages.
-    text : str, optional
-        What the file will hold, where it is not written yet.
-
     Raises
     ------
     BadInputError
@@ -136,8 +128,6 @@ def merge(base: Tree, extra: Tree, origin: Origin, file: str, above: str = "") -
         A leaf may be written ``{value: ..., unit: ..., source: ...}``.
     origin : Origin
         Updated with the file and source of every leaf of ``extra``.
-    file : str
-        Name of the file that ``extra`` came from.
     above : str
         Key path of ``base``.
     """

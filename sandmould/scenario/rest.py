@@ -65,13 +65,7 @@ class Rest(Section):
     )
 
     def while_shaken(self, step_s: float) -> Rest:
-        """Give the checks from the first vibration on; as many as make up the same time find rest.
-
-        Parameters
-        ----------
-        step_s : float, s
-            Time step.
-        """
+        """Give the checks from the first vibration on; as many as fill the same time find rest."""
         asked_s = self.shaken_check_every_s
         if asked_s is None:
             return self

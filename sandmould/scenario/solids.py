@@ -142,10 +142,8 @@ def cylinder_along(
 
     Parameters
     ----------
-    name : str
     centre_m, axis : (3,) float64
         Centre, m, and unit vector along the axis.
-    diameter_m, length_m : float, m
     """
     half_m, radius_m = length_m / 2, diameter_m / 2
     profile_m = np.array([[-half_m, 0.0], [half_m, 0.0], [half_m, radius_m], [-half_m, radius_m]])
@@ -163,12 +161,6 @@ class Drawing(NamesFile, Protocol):
 def mesh_solid(solid: SolidMesh, key: str) -> TriangleMesh:
     """Geometry of a mesh, scaled and shifted into the box.
 
-    Parameters
-    ----------
-    solid : SolidMesh
-    key : str
-        Key path of the obstacle, for messages.
-
     Raises
     ------
     BadInputError
@@ -180,12 +172,6 @@ def mesh_solid(solid: SolidMesh, key: str) -> TriangleMesh:
 
 def drawn_surface(drawing: Drawing, key: str) -> tuple[Array, NDArray[np.int64]]:
     """Closed surface of a drawing about its own origin, scaled.
-
-    Parameters
-    ----------
-    drawing : Drawing
-    key : str
-        Key path of its section, for messages.
 
     Returns
     -------
@@ -219,7 +205,6 @@ def other_units(drawing: Drawing, size_m: Array, box_m: Array) -> list[tuple[flo
 
     Parameters
     ----------
-    drawing : Drawing
     size_m : (3,) float64, m
         As read.
     box_m : (3,) float64, m
@@ -266,7 +251,6 @@ def drawn_part(drawing: Drawing, box_m: Array) -> DrawnPart:
 
     Parameters
     ----------
-    drawing : Drawing
     box_m : (3,) float64, m
         Size of the box that it stands in.
     """

@@ -16,7 +16,6 @@ def standing_keys(model: type[BaseModel], tree: Any, parts: list[str]) -> list[s
 
     Parameters
     ----------
-    model : type of BaseModel
     tree : any
         What was read for the model.
     parts : list of str

@@ -66,7 +66,6 @@ def damped_step(omega_rad_s: float, damping_ratio: float, correction_per_s: floa
 
     Parameters
     ----------
-    omega_rad_s : float
     damping_ratio : float
         xi of the mode, that of plain dashpots.
     correction_per_s : float
@@ -126,13 +125,7 @@ def critical_step(
 ) -> CriticalStep:
     """Critical time step of a scene, set by its smallest grains.
 
-    Parameters
-    ----------
-    sand : Sand
-    contact : Contact
-    time_step : TimeStep
-        Its rotational inertia counts.
-    dimension : int
+    ``time_step``: its rotational inertia counts.
 
     Notes
     -----

@@ -106,11 +106,7 @@ class Unbalance(Section):
     def largest_amplitude_m(self, angular_frequency_rad_s: float, sand_kg: float) -> float:
         """Largest steady amplitude with any share of the sand as a mass that moves with the table.
 
-        Parameters
-        ----------
-        angular_frequency_rad_s : float
-        sand_kg : float
-            All sand, as the table feels it.
+        ``sand_kg``: all sand, as the table feels it.
         """
         resonant = self.stiffness_n_m / angular_frequency_rad_s**2 - self.moving_mass_kg
         shares = (0.0, sand_kg, min(max(resonant, 0.0), sand_kg))

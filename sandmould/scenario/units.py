@@ -29,14 +29,6 @@ _SPELT = str.maketrans({"µ": "u", "μ": "u", "²": "2", "³": "3", "^": None, "
 def in_unit(value: object, stated: object, units: Iterable[str]) -> str:
     """Say which number to write for a value that is stated in another unit of the same kind.
 
-    Parameters
-    ----------
-    value : any
-    stated : any
-        Its unit as written.
-    units : iterable of str
-        Units that the key can have.
-
     Returns
     -------
     str

@@ -41,13 +41,7 @@ class Evidence:
 
 
 def decide(asked: Asked, evidence: Evidence) -> Answer:
-    """Answer the question of a study, and say of every other cavity and pattern how it does.
-
-    Parameters
-    ----------
-    asked : Asked
-    evidence : Evidence
-    """
+    """Answer the question of a study, and say of every other cavity and pattern how it does."""
     answer = _decide_one(asked, evidence)
     if asked.better == "neither":
         return answer

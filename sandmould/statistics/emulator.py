@@ -57,7 +57,6 @@ class Emulator:
         Parameters
         ----------
         points : (n, d) float64
-        number, seed : int
 
         Returns
         -------
@@ -88,7 +87,6 @@ def fit_emulator(measure: str, points: Array, values: Array) -> Emulator:
 
     Parameters
     ----------
-    measure : str
     points : (n, d) float64
         Values of the swept keys of each run.
     values : (n,) float64

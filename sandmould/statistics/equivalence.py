@@ -63,12 +63,9 @@ def agree(first: pd.Series[float], second: pd.Series[float], margin: float) -> A
     differ by more than the margin. Anything else is not resolved, however small the difference
     seems: a wide spread is no agreement.
 
-    Parameters
-    ----------
-    first, second : Series of float
-        Values by block: replicates that share their seeds have one label. Blocks that both have
-        are compared in pairs; without a common one the groups are compared by Welch's test.
-    margin : float
+    ``first``, ``second``: values by block: replicates that share their seeds have one label. Blocks
+    that both have are compared in pairs; without a common one the groups are compared by Welch's
+    test.
     """
     shared = first.index.intersection(second.index)
     if len(shared):

@@ -34,12 +34,7 @@ NOT_FINISHED, NO_VALUE = "did not finish", "no value"
 def loop_fails(summary: pd.DataFrame, measure: str) -> pd.Series[bool]:
     """Whether a run finished and its loop alone keeps it from counting.
 
-    Parameters
-    ----------
-    summary : DataFrame
-        One row a run.
-    measure : str
-        What it would be evidence of: measures of the loop itself need no loop that holds.
+    ``measure``: what it would be evidence of: measures of the loop itself need no loop that holds.
     """
     if LOOP not in summary or measure in OF_THE_LOOP:
         return pd.Series(False, index=summary.index)

@@ -118,14 +118,7 @@ def find_optimum(
 
     Parameters
     ----------
-    summary : DataFrame
-        One row a run of the sweep.
-    keys : sequence of str
-        Swept keys, all numbers.
-    measure : str
     better : {"larger", "smaller"}
-    seed : int
-        Of the draws.
 
     Raises
     ------

@@ -34,21 +34,7 @@ class Passage:
 
 
 def passage_of(curves: pd.DataFrame, runs: Iterable[str], measure: str) -> Passage | None:
-    """A measure of some runs over their vibration.
-
-    Parameters
-    ----------
-    curves : DataFrame
-        One row a snapshot.
-    runs : iterable of str
-        Names of runs that count.
-    measure : str
-
-    Returns
-    -------
-    Passage or None
-        None where no run tells.
-    """
+    """A measure of some runs over their vibration; None where no run tells."""
     shaken = _shaken(curves, runs, measure)
     passages = []
     for _, run in shaken.groupby(RUN):
@@ -60,14 +46,7 @@ def passage_of(curves: pd.DataFrame, runs: Iterable[str], measure: str) -> Passa
 
 
 def reached_s(curves: pd.DataFrame, runs: Iterable[str], measure: str, level: float) -> float:
-    """Time of vibration after which some runs reach a level, as their mean; NaN where one does not.
-
-    Parameters
-    ----------
-    curves, runs, measure
-        As of ``passage_of``.
-    level : float
-    """
+    """Time of vibration after which runs reach a level, as their mean; NaN where one does not."""
     shaken = _shaken(curves, runs, measure)
     times_s = [
         first_reach_s(run[VIBRATION_TIME_S], run[measure], level) for _, run in shaken.groupby(RUN)
@@ -88,7 +67,6 @@ def first_reach_s(time_s: ArrayLike, value: ArrayLike, level: float) -> float:
     ----------
     time_s, value : (n,) float64
         In order of time.
-    level : float
 
     Returns
     -------

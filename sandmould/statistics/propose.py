@@ -27,18 +27,8 @@ def propose(
 
     Parameters
     ----------
-    optimum : Optimum
-    summary : DataFrame
-        One row a run of all that was computed, finished or not.
-    runs : int
-    seed : int
-        Another one for every round.
     whole : collection of str
         Keys that take whole numbers only.
-
-    Returns
-    -------
-    list of (point, replicate)
     """
     keys = optimum.keys
     rng = np.random.default_rng([seed, runs])

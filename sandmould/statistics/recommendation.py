@@ -60,21 +60,14 @@ def recommend(
     model: ModelWaveSpeed,
     sand: SandWaveSpeed | None,
 ) -> Recommendation | None:
-    """Recommend a frequency where the controls allow it.
+    """Recommend a frequency where the controls allow it; None where springs were not controlled.
 
     Parameters
     ----------
-    robustness : Robustness
     interval_hz : (float, float)
         95 % interval of the optimum.
-    model : ModelWaveSpeed
     sand : SandWaveSpeed, optional
         Of the real sand, from a source.
-
-    Returns
-    -------
-    Recommendation or None
-        None where the control of the springs was not run.
     """
     if robustness.springs is None:
         return None

@@ -120,15 +120,7 @@ def by_block(
 
 
 def compare(best: Setting, others: Sequence[Setting], spread: Spread) -> tuple[Comparison, ...]:
-    """The best minus each other setting, nearest first.
-
-    Parameters
-    ----------
-    best : Setting
-    others : sequence of Setting
-    spread : Spread
-        Of all settings, by which they are compared.
-    """
+    """The best minus each other setting, nearest first."""
     return tuple(
         Comparison(other.label, *spread.compare(best.label, other.label)) for other in others
     )

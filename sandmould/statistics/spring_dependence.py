@@ -120,14 +120,9 @@ def assess_springs(
 
     Parameters
     ----------
-    summary : DataFrame
-        One row a run, those of the controls among them.
-    key : str
-        The swept frequency.
     best_hz : float
         Frequency at which all holds are one motion, run once a stiffness; those of a study with an
         unbalance are not.
-    objective : Objective
     cases : sequence of ControlCase
         Of all controls.
     own_hold : str

@@ -68,10 +68,6 @@ def compare_settings(
     ----------
     summary : DataFrame
         One row a run, from :func:`sandmould.study.collect.collect`.
-    keys : sequence of str
-        Swept keys; a setting is a combination of their values.
-    measure : str
-        Column of the objective.
     better : {"larger", "smaller", "neither"}
         Which values are better.
     """
@@ -114,8 +110,6 @@ def rank_runs(summary: pd.DataFrame, measure: str, better: Better = "larger") ->
 
     Parameters
     ----------
-    summary : DataFrame
-    measure : str
     better : {"larger", "smaller", "neither"}
 
     Returns

@@ -172,20 +172,9 @@ def _read_table(path: Path, words: Sequence[str]) -> pd.DataFrame:
 
 
 def compare_study(summary: pd.DataFrame, keys: Sequence[str], study: Study) -> tuple[Compared, ...]:
-    """Compare all that a study wants compared.
+    """Compare all that a study wants compared; empty where that is nothing.
 
-    Parameters
-    ----------
-    summary : DataFrame
-        One row a run; runs of the cross check have it in their column ``part``.
-    keys : sequence of str
-        Swept keys.
-    study : Study
-
-    Returns
-    -------
-    tuple of Compared
-        Empty where the study compares nothing.
+    ``summary``: one row a run; runs of the cross check have it in their column ``part``.
     """
     equivalence = study.equivalence
     swept = sweep_part(summary)
@@ -285,16 +274,7 @@ def gather_runs(
 def shares_of_fills(fills: pd.Series[str], study_folder: Path) -> dict[str, pd.Series[float]]:
     """What each run's fill took, over the runs that share it: sums count a fill once.
 
-    Parameters
-    ----------
-    fills : Series of str
-        Name of each run's fill; missing for a run that shares none.
-    study_folder : Path
-
-    Returns
-    -------
-    dict of str to Series
-        Columns for the summary, s.
+    ``fills``: name of each run's fill; missing for a run that shares none.
     """
     names = fills.dropna().unique()
     costs = read_costs([study_folder / FILLS / name for name in names])

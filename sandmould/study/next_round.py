@@ -12,19 +12,7 @@ from sandmould.study.rounds.round_log import RoundLog, read_rounds, write_rounds
 
 
 def decide_next(study: Study, folder: Path) -> tuple[RoundLog, str]:
-    """Add what comes next to the rounds of a study.
-
-    Parameters
-    ----------
-    study : Study
-    folder : Path
-        ``results/<study>``, with the tables of all runs so far.
-
-    Returns
-    -------
-    RoundLog, str
-        The rounds, and the decision in one line.
-    """
+    """Add what comes next to the rounds of a study."""
     summary = sweep_part(read_summary(folder))
     log = next_runs(read_rounds(folder, study), study, summary, list(swept_keys(summary)))
     write_rounds(log, folder)

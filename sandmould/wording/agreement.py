@@ -15,13 +15,7 @@ MOST_NAMED = 2
 
 
 def agreement_sentences(compared: Sequence[Compared]) -> tuple[str, ...]:
-    """Say first whether all agree, then what does not.
-
-    Parameters
-    ----------
-    compared : sequence of Compared
-        At least one.
-    """
+    """Say first whether all agree, then what does not."""
     by_verdict = {
         verdict: _named([c for c in compared if c.agreement.verdict == verdict], compared)
         for verdict in ("different", "not resolved", "not tested")

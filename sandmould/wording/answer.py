@@ -70,13 +70,7 @@ def sand_limits(
 ) -> tuple[str, ...]:
     """What a sweep over sand leaves open: what the vibration held constant, and the springs.
 
-    Parameters
-    ----------
-    keys : sequence of str
-        Swept keys.
-    stage : VibrationStage, optional
-    is_unchecked : bool
-        Whether the best setting was looked for and its controls have not been run.
+    ``is_unchecked``: whether the best setting was looked for and its controls have not been run.
     """
     hold = stage.hold if stage and any(k.endswith("frequency_hz") for k in keys) else ""
     return sentences("sand_limits.j2", hold=hold, is_unchecked=is_unchecked)

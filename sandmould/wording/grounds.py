@@ -21,7 +21,6 @@ def scatter_grounds(verdict: Verdict, differ_in: str, seeks_best: bool) -> tuple
 
     Parameters
     ----------
-    verdict : Verdict
     differ_in : str
         What the replicates of a setting do not share.
     seeks_best : bool
@@ -50,16 +49,7 @@ def sand_grounds(
 ) -> tuple[Note, ...]:
     """Say how sure the answer of a study of sand is.
 
-    Parameters
-    ----------
-    scenario : Scenario
-        Of the run that is shown.
-    study : Study
-    verdict : Verdict
-    by_setting : mapping of str to Scenario
-        By label of the setting.
-    of_grains : sequence of str
-        What runs with coarser grains say; empty where there are none.
+    ``of_grains``: what runs with coarser grains say; empty where there are none.
     """
     vibrations = scenario.vibrations
     return scatter_grounds(verdict, "random fillings", study.seeks_best) + notes(

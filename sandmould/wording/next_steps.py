@@ -78,13 +78,10 @@ def with_file(steps: Sequence[NextStep], owner: str | None, shipped: str, name: 
 
     Parameters
     ----------
-    steps : sequence of NextStep
     owner : str or None
         The user's file of the study; None where nobody knows it.
     shipped : str
         Name of the shipped study that it is; empty where it is the user's.
-    name : str
-        Of the study.
     """
     file = OWN_FILE if shipped or owner is None else owner
     below = f" a file {file} below based_on: {shipped or name}"
@@ -105,13 +102,7 @@ def failed_steps(runs: Sequence[str]) -> list[NextStep]:
 
 
 def answer_steps(study: Study, answer: Answer) -> list[NextStep]:
-    """What the answer of a study asks for: never what is refused, or was computed.
-
-    Parameters
-    ----------
-    study : Study
-    answer : Answer
-    """
+    """What the answer of a study asks for: never what is refused, or was computed."""
     decided, key = answer.decided, name_of(answer.asked.keys[0]) if answer.asked.keys else ""
     if decided is Decided.NO_RESULT:
         return []
@@ -170,16 +161,7 @@ def _finer(answer: Answer) -> list[NextStep]:
 def optimum_steps(
     study: Study, optimum: Optimum | None, robustness: Robustness | None
 ) -> list[NextStep]:
-    """What an optimum and its controls ask for.
-
-    Parameters
-    ----------
-    study : Study
-    optimum : Optimum, optional
-        None where too few runs tell it.
-    robustness : Robustness, optional
-        Its controls.
-    """
+    """What an optimum and its controls ask for."""
     if optimum is None:
         return [step("settings")]
     steps = []

@@ -21,7 +21,6 @@ from sandmould.definition.run import Run
 from sandmould.engines.snapshot_file import stored_snapshots
 from sandmould.execution.again import _failed_fill
 from sandmould.execution.jobs import compute_run
-from sandmould.execution.packs import recorded
 from sandmould.execution.packs.pack import pack
 from sandmould.execution.packs.unpack import unpack
 from sandmould.execution.simulate import render_run, simulate
@@ -33,7 +32,8 @@ from sandmould.runs.outcome import Outcome, RunOutcome
 from sandmould.runs.run_tables import read_costs
 from sandmould.scenario.scenario import Scenario
 from sandmould.study.collect import collect
-from sandmould.study.plan.build_plan import RESULTS, Plan, open_plan, prepare
+from sandmould.study.plan.announcement import prepare
+from sandmould.study.plan.build_plan import RESULTS, Plan, open_plan
 from sandmould.study.plan.fills import share_fills
 from sandmould.study.plan.lacking import Need, lack_of
 from sandmould.study.plan.plan_files import read_run
@@ -304,9 +304,7 @@ def test_what_is_lost_of_a_study_is_computed_from_its_fills(sweep: Plan) -> None
     assert f"computed again: {fill.run} ({why})" in prepare(plan, RESULTS)
 
 
-def test_packed_runs_need_no_fill_and_its_cost_travels(
-    sweep: Plan, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_packed_runs_need_no_fill_and_its_cost_travels(sweep: Plan) -> None:
     plan, folder = sweep, RESULTS / "small"
     (fill,), (_, run) = plan.fills, plan.runs
     collect(folder)
@@ -326,18 +324,3 @@ def test_packed_runs_need_no_fill_and_its_cost_travels(
     shutil.rmtree(folder / run.place)
     announce(plan, RESULTS, 1)
     assert set(plan.lacks(RESULTS)) == {fill.run, run.run}
-    # The record of a shipped study tells it, too.
-    shipped = Path("config/studies/small.yaml").absolute()
-    shipped.parent.mkdir(parents=True)
-    shutil.copy("small.yaml", shipped)
-    monkeypatch.setattr(recorded, "SHIPPED", Path().absolute())
-    monkeypatch.setattr(recorded, "RECORDS", Path("records").absolute())
-    shutil.rmtree(RESULTS)
-    unpack(small, RESULTS)
-    plan = open_plan(shipped)
-    recorded.record_part(plan, RESULTS)
-    shutil.rmtree(RESULTS)
-    plan, said = recorded.take_up(plan, RESULTS)
-    assert said == "2 runs taken from the record of small"
-    assert plan.lacks(RESULTS) == {}
-    assert (folder / fill.place / "outcome.json").exists()

@@ -13,18 +13,11 @@ from sandmould.execution.cluster.settings import goes_to_slurm, may_be_elsewhere
 from sandmould.execution.cluster.submission import open_submission
 from sandmould.execution import jobs
 from sandmould.execution.locks import hold_turn
-from sandmould.execution.packs.recorded import take_up
 from sandmould.execution.pool import start_server
 from sandmould.execution.spent import note_spent
 from sandmould.study.plan.batches import alone, read_batches, write_batches
-from sandmould.study.plan.build_plan import (
-    RESULTS,
-    announce,
-    plan_at_hand,
-    prepare,
-    starts_jobs,
-    study_path,
-)
+from sandmould.study.plan.announcement import announce, prepare
+from sandmould.study.plan.build_plan import RESULTS, plan_at_hand, starts_jobs, study_path
 from sandmould.study.plan.plan_files import CHECKS as CHECK_TABLES
 from sandmould.study.plan.plan_files import write_run
 from sandmould.study.plan.load_study import CALIBRATED
@@ -45,9 +38,6 @@ try:
     starts = workflow.is_main_process and starts_jobs(sys.argv)
     if starts:
         hold_turn(RESULTS / PLAN.study.name)
-        PLAN, taken = take_up(PLAN, RESULTS)
-        if taken:
-            say(taken)
     STATED = workflow.resource_settings.default_resources or {}
     SUBMISSION = open_submission(PLAN, sys.argv, STATED)
     is_here = workflow.is_main_process and not may_be_elsewhere(sys.argv)

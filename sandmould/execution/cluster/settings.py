@@ -61,12 +61,7 @@ class Cluster(Section):
 
 
 def read_cluster(path: Path = CLUSTER_FILE) -> Cluster:
-    """Read what the user says; nothing is said where the file is not there.
-
-    Raises
-    ------
-    BadInputError
-    """
+    """Read what the user says; nothing is said where the file is not there."""
     if not path.exists():
         return Cluster()
     return validated(Cluster, read_yaml(path, str(path)), Origin({"": str(path)}))
@@ -82,13 +77,7 @@ def may_be_elsewhere(arguments: Sequence[str]) -> bool:
 
 
 def goes_to_slurm(arguments: Sequence[str]) -> bool:
-    """Whether Snakemake called with these arguments submits jobs to Slurm, as its profile says.
-
-    Parameters
-    ----------
-    arguments : sequence of str
-        The command line.
-    """
+    """Whether Snakemake called with these arguments submits jobs to Slurm, as its profile says."""
     words = [
         word for argument in arguments for word in re.split("(?<=[a-z])=", argument, maxsplit=1)
     ]

@@ -31,11 +31,7 @@ class Submission:
     def __init__(self, plan: Plan, cluster: Cluster | None) -> None:
         """Ask the cluster nothing yet.
 
-        Parameters
-        ----------
-        plan : Plan
-        cluster : Cluster or None
-            None where jobs are of this machine.
+        ``cluster``: None where jobs are of this machine.
         """
         self._plan = plan
         self._cluster = cluster or Cluster()
@@ -58,11 +54,6 @@ class Submission:
 
     def ask(self, batches: Sequence[Batch]) -> None:
         """Ask Slurm whether it takes the jobs and what an earlier start has left in its queue.
-
-        Parameters
-        ----------
-        batches : sequence of Batch
-            Runs that share jobs.
 
         Raises
         ------
@@ -136,16 +127,10 @@ def open_submission(plan: Plan, arguments: Sequence[str], stated: Mapping[str, A
 
     Parameters
     ----------
-    plan : Plan
     arguments : sequence of str
         Snakemake's command line.
     stated : mapping
         Its default resources, which hold where ``cluster.yaml`` says nothing.
-
-    Raises
-    ------
-    BadInputError
-        Where ``cluster.yaml`` is wrong.
     """
     if not goes_to_slurm(arguments):
         return Submission(plan, None)

@@ -6,7 +6,6 @@ import contextlib
 import os
 import shutil
 import time
-from collections.abc import Iterable
 from pathlib import Path
 
 from sandmould.bad_input import BadInputError
@@ -46,31 +45,21 @@ def unpack(path: Path, results: Path) -> str:
         then.
     """
     with open_pack(path) as pack, take_turn(results / pack.study) or contextlib.nullcontext():
-        left = take(pack, results / pack.study, pack.runs)
+        left = _take(pack, results / pack.study)
         taken = list(left.values()).count("")
         reasons = {run: why for run, why in left.items() if why}
         lines = [f"{pack.study}: {taken} runs taken", *reasons_lines(reasons, "not taken")]
         return "\n".join(lines)
 
 
-def take(pack: Pack, folder: Path, places: Iterable[str]) -> dict[str, str]:
-    """Put runs and fills into ``results/<study>``, once the files of all are whole.
+def _take(pack: Pack, folder: Path) -> dict[str, str]:
+    """Put runs and fills into ``results/<study>``; why a run was not taken, or nothing, by name.
 
     Of a fill its cost is taken, not the state that runs go on from, which engines read unchecked.
-
-    Returns
-    -------
-    dict
-        Why a run was not taken, by its name; empty where it was.
-
-    Raises
-    ------
-    ValueError, BadInputError
-        Where the pack is damaged, or the disk takes no more.
     """
     part, judge = folder / "unpacking.partial", _Judge(pack.study)
-    wanted = [place for place in sorted(places) if not judge.is_here(folder, place)]
-    left = {Path(place).name: "here already" for place in places if place not in wanted}
+    wanted = [place for place in sorted(pack.runs) if not judge.is_here(folder, place)]
+    left = {Path(place).name: "here already" for place in pack.runs if place not in wanted}
     names = [n for p in wanted for n in pack.runs[p] if not _fill(p) or Path(n).name in AT_END]
     with writing(folder):
         folder.mkdir(parents=True, exist_ok=True)
@@ -85,7 +74,7 @@ def take(pack: Pack, folder: Path, places: Iterable[str]) -> dict[str, str]:
                     _move(part / place, folder / place)
         finally:
             shutil.rmtree(part, ignore_errors=True)
-    fills = {Path(place).name for place in places if _fill(place)}
+    fills = {Path(place).name for place in pack.runs if _fill(place)}
     return {name: why for name, why in left.items() if name not in fills}
 
 
@@ -135,13 +124,7 @@ def _deck(folder: Path) -> str:
 
 
 def _take_rounds(text: bytes, path: Path) -> dict[str, str]:
-    """Take the bytes of a ``rounds.json`` that begins as ours; why not, where others were chosen.
-
-    Raises
-    ------
-    ValueError
-        When they are no list of rounds.
-    """
+    """Take the bytes of a ``rounds.json`` that begins as ours; why not, where others were taken."""
     theirs = log_of(text)
     ours = log_of(path.read_bytes()) if path.is_file() else RoundLog(theirs.basis)
     both = min(len(theirs.rounds), len(ours.rounds))

@@ -20,15 +20,7 @@ LISTED_LINES = 6
 
 
 def trouble(folder: Path, log: Path) -> str:
-    """Say why a study stopped outside its runs: a file that was refused, else Snakemake's words.
-
-    Parameters
-    ----------
-    folder : Path
-        ``results/<study>``.
-    log : Path
-        Snakemake's.
-    """
+    """Say why a study stopped outside its runs: a file that was refused, else Snakemake's words."""
     text = log.read_text(encoding="utf-8", errors="replace") if log.exists() else ""
     refused = [(after or before, why) for before, why, after in _REFUSED.findall(text)]
     try:  # a full disk has no room for the log either
@@ -50,13 +42,7 @@ def trouble(folder: Path, log: Path) -> str:
 
 
 def last_line(folder: Path) -> str:
-    """The verdict's sentence and where the report is; empty without a report.
-
-    Parameters
-    ----------
-    folder : Path
-        ``results/<study>``.
-    """
+    """The verdict's sentence and where the report is; empty without a report."""
     report, verdict = folder / REPORT_FILE, folder / VERDICT_FILE
     if not report.exists():
         return ""

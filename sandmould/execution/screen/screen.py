@@ -20,7 +20,8 @@ from sandmould.execution.screen.view import RunView, StudyView
 from sandmould.execution.time_left import TimeLeft
 from sandmould.runs.progress import duration_text
 from sandmould.runs.words import Words
-from sandmould.study.plan.build_plan import Plan, stored_speeds
+from sandmould.study.plan.announcement import stored_speeds
+from sandmould.study.plan.build_plan import Plan
 from sandmould.study.plan.price import computed_wall_s
 
 if TYPE_CHECKING:
@@ -55,10 +56,6 @@ class Screen:
 
         Parameters
         ----------
-        plan : Plan
-        results : Path
-        cores : int
-            That share the runs.
         live : bool, optional
             Whether to draw a table again and again; by default where stderr is a terminal that
             can.

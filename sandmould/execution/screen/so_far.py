@@ -80,20 +80,9 @@ class SoFar:
 
 
 def so_far_text(summary: pd.DataFrame, study: Study, settings: int) -> str:
-    """What some of a study's runs say of its objective, in one sentence.
+    """What some of a study's runs say of its objective, in one sentence; empty without a value.
 
-    Parameters
-    ----------
-    summary : DataFrame
-        One row a run that has ended.
-    study : Study
-    settings : int
-        That are planned: before each has a value, none is called the best.
-
-    Returns
-    -------
-    str
-        Empty where no run has a value.
+    ``settings``: how many are planned: before each has a value, none is called the best.
     """
     measure, better = study.objective.measure, study.objective.better
     swept = sweep_part(summary)

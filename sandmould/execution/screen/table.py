@@ -21,12 +21,6 @@ def study_table(view: StudyView, width: int, height: int) -> RenderableType:
     """Lay out a study for a terminal, no higher than it is.
 
     States are words, never colours alone.
-
-    Parameters
-    ----------
-    view : StudyView
-    width, height : int
-        Columns and lines of the terminal.
     """
     head = [_counts(view), _whole(view, width)]
     if view.so_far:

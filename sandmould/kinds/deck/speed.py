@@ -92,7 +92,6 @@ def pilot(scenario: OwnDeck, results: Path, pilot_s: float = PILOT_S) -> tuple[f
         One of several ranks has no pilot.
     results : Path
         Folder of all results, which keeps the log of a pilot that failed.
-    pilot_s : float, s
 
     Returns
     -------

@@ -124,21 +124,14 @@ class BentPattern:
 
 
 def add_loop(table: pd.DataFrame, folder: Path, reach_m: float) -> pd.DataFrame:
-    """Add to the measures of a run what its log tells of the windows up to each snapshot.
+    """Add to the measures of a run what its log tells of the windows up to each, if it has one.
 
     Parameters
     ----------
     table : DataFrame
         Rows of ``measures.tsv`` in order of time.
-    folder : Path
-        The run's folder.
     reach_m : float, m
         Arm that a moment left over is compared with.
-
-    Returns
-    -------
-    DataFrame
-        As given where the run has no convergence log.
     """
     log = convergence_log_of(folder)
     if log is None or "pattern_tip_deflection_m" not in table:

@@ -18,16 +18,7 @@ def shape_moments(moments: tuple[Moment, ...]) -> dict[str, Moment]:
 
 
 def write_bent(scenario: Scenario, run_folder: Path, out: Path) -> None:
-    """Write the pattern after filling and at the end: the solid as STL, the surface as VTK.
-
-    Parameters
-    ----------
-    scenario : Scenario
-        With a pattern.
-    run_folder : Path
-    out : Path
-        Folder of ``pattern_filled.stl`` and its likes.
-    """
+    """Write the pattern after filling and at the end: the solid as STL, the surface as VTK."""
     out.mkdir(exist_ok=True)
     bent = BentPattern(scenario)
     for name, moment in shape_moments(list_moments(run_folder)).items():
@@ -45,15 +36,6 @@ def write_solids(scenario: Scenario, moments: tuple[Moment, ...], out: Path) -> 
     """Write the whole pattern with its stress at the end of every stage (.vtu).
 
     It is at rest under the mean load of the record, or bent as its surface is where it has no rest.
-
-    Parameters
-    ----------
-    scenario : Scenario
-        With a pattern.
-    moments : tuple of Moment
-        Of a run.
-    out : Path
-        Folder of ``pattern_settle_1.vtu`` and its likes.
     """
     bent = BentPattern(scenario)
     last = {snapshot.stage: snapshot for snapshot in (moment.load() for moment in moments)}

@@ -22,11 +22,8 @@ def add_drive(scenario: Scenario, table: pd.DataFrame, folder: Path) -> pd.DataF
 
     Parameters
     ----------
-    scenario : Scenario
     table : DataFrame
         Measures of a run's snapshots, in order of time.
-    folder : Path
-        Of the run.
 
     Returns
     -------

@@ -29,11 +29,6 @@ def best_by_records(scenarios: Sequence[Scenario]) -> float:
 
     NaN unless all of them shake one tube of the records' kind upright, within their range, at
     frequencies that differ.
-
-    Parameters
-    ----------
-    scenarios : sequence of Scenario
-        One a setting.
     """
     fills = {_frequency_hz(scenario): _foretold(scenario) for scenario in scenarios}
     if len(fills) < max(2, len(scenarios)) or not np.isfinite([*fills.values()]).all():

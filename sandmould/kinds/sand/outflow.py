@@ -162,10 +162,7 @@ def outflow_time_s(table: pd.DataFrame) -> float:
 def side_load_fraction(loads: pd.DataFrame) -> float:
     """Horizontal forces of the filled sand on all that holds it over its weight on the floors.
 
-    Parameters
-    ----------
-    loads : DataFrame
-        ``loads.tsv`` of a run; the last window before the gate opens is taken.
+    ``loads``: ``loads.tsv`` of a run; the last window before the gate opens is taken.
     """
     filled = loads[loads["stage"].map(is_filling).astype(bool)]
     last = filled[filled["time_s"] == filled["time_s"].max()]
@@ -182,15 +179,7 @@ def _floor(scenario: Scenario) -> tuple[np.ndarray, np.ndarray]:
 
 
 def add_outflow(table: pd.DataFrame, folder: Path) -> pd.DataFrame:
-    """Add what only the whole run tells to all rows of its measures.
-
-    Parameters
-    ----------
-    table : DataFrame
-        Rows of ``measures.tsv``.
-    folder : Path
-        The run's folder.
-    """
+    """Add what only the whole run tells to all rows of its measures."""
     if "outflow_fraction" not in table:
         return table
     loads = pd.read_csv(folder / "loads.tsv", sep="\t")

@@ -26,11 +26,8 @@ def lay_fill(run: Run, folder: Path, program: Program) -> Computed | None:
 
     Parameters
     ----------
-    run : Run
     folder : Path
         ``results/<study>/runs/<run>``; the fills of the study lie beside the runs.
-    program : Program
-        Of the run's scenario.
 
     Returns
     -------
@@ -85,10 +82,6 @@ def fill_apart(run: Run, folder: Path, program: Program, opening: Opening) -> Co
     ----------
     run : Run
         Whose scenario has ``rest.shaken_check_every_s``.
-    folder : Path
-        Of the run.
-    program : Program
-        Of the run's scenario.
     opening : callable
         Opens a session.
 

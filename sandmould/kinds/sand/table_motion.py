@@ -15,13 +15,7 @@ _HEADS = ("frequency", "amplitude*", "velocity", "acceleration")
 
 
 def table_lines(scenarios: Iterable[Scenario]) -> list[str]:
-    """Frequency, amplitude, velocity and acceleration of each vibration, as lines of a table.
-
-    Parameters
-    ----------
-    scenarios : iterable of Scenario
-        One a setting.
-    """
+    """Frequency, amplitude, velocity and acceleration of each vibration, as lines of a table."""
     every = list(scenarios)
     stages = [stage for scenario in every for stage in scenario.vibrations]
     rows = list(dict.fromkeys(_row(laid_down_drive(stage)) for stage in stages))

@@ -34,12 +34,11 @@ from sandmould.report.flow_charts import (
     stability_map,
 )
 from sandmould.report.kinds.kind import Findings, FirstPicture, KindPages, KindReport
-from sandmould.report.method import Row
 from sandmould.report.tables import Cell, Column, Table
 from sandmould.report.time_series import measure_curves
 from sandmould.runs.columns import CLASSIFICATION, DETAIL, HOPS, OUTCOME_CODE, RUN
-from sandmould.runs.formatting import listed, name_of, number, setting_text
-from sandmould.runs.templates import notes, sentences, worded
+from sandmould.runs.formatting import name_of, number, setting_text
+from sandmould.runs.templates import Note, notes, sentences, worded
 from sandmould.scenario.casting.flow import MetalFlow, PouredMetal, StillTank
 from sandmould.study.collect import Collected
 from sandmould.wording.next_steps import NextStep
@@ -296,41 +295,19 @@ def _grid(count: int, height: float) -> tuple[Figure, list[Axes]]:
     return figure, list(panels[:count])
 
 
-def _collisions(scenario: MetalFlow, keys: Sequence[str]) -> str:
-    """Whether particles that come too near collide."""
-    if "collision_distance" in keys:
-        return "collisions as swept"
-    near = scenario.collision_distance
-    return f"particles nearer than {near:g} of their size collide" if near else "no collisions"
-
-
-def _method(scenario: MetalFlow, keys: Sequence[str]) -> tuple[Row, ...]:
+def _method(scenario: MetalFlow, keys: Sequence[str]) -> tuple[Note, ...]:
     """How the runs were computed; see ``sand_method``."""
-    case, metal, scheme = scenario.case, scenario.metal, scene.scheme_of(scenario)
-    size_mm = 1e3 * case.particle_m
-    if isinstance(case, StillTank):
-        where = (f"metal at rest in a tank, {1e3 * case.width_m:g} mm wide and "
-                 f"{1e3 * case.depth_m:g} mm deep, in two dimensions")  # fmt: skip
-    else:
-        where = (f"a cylinder {1e3 * PAPERS.height_m:g} mm high, {1e3 * PAPERS.lower_m:g} mm "
-                 f"wide below and {1e3 * PAPERS.upper_m:g} mm above, poured at "
-                 f"{1e3 * case.rate_kg_s:g} g/s")  # fmt: skip
-    return (
-        Row("Method", "moving particles, semi-implicit (MPS), with the improved multiple "
-            "relaxation of Hirata and Anzai (2017)"),
-        Row("Case", f"{where}; particles of {size_mm:g} mm"),
-        Row("Metal", f"{metal.density_kg_m3:g} kg/m³, {metal.viscosity_m2_s:g} m²/s; gravity "
-            f"{G_M_S2:g} m/s²"),
-        Row("Scheme", f"source {scheme.source}, gradient {scheme.gradient}, "
-            f"Laplacian {scheme.laplacian}, surface below {scheme.surface:g} of the full "
-            f"number density, Courant number {scheme.courant:g}; Poisson equation to "
-            f"{scheme.tolerance:g}; {_collisions(scenario, keys)}"),
-        Row("Measures", f"from {scenario.measured_from_s:g} to {scenario.duration_s:g} s, at the "
-            "particle nearest to each probe; excellent: deviation at the deepest probe below "
-            f"{QUIET_PA:g} Pa and no hopping; good: the run ends; failed: a guard stops "
-            "it"),
-        Row("Swept", listed([name_of(k) for k in keys], most=20) or "nothing"),
-    )  # fmt: skip
+    return notes(
+        "flow_method.j2",
+        flow=scenario,
+        case=scenario.case,
+        papers=PAPERS,
+        gravity_m_s2=G_M_S2,
+        scheme=scene.scheme_of(scenario),
+        collides_as_swept="collision_distance" in keys,
+        quiet_pa=QUIET_PA,
+        swept=[name_of(key) for key in keys],
+    )
 
 
 REPORT = KindReport(_pages, _notes)

@@ -13,7 +13,6 @@ from sandmould.definition.study import Study
 from sandmould.drawing.chart import Chart
 from sandmould.kinds.kind import ScenarioT
 from sandmould.report.bed_mode import BedMode
-from sandmould.report.method import Row
 from sandmould.report.repose_figures import Heap
 from sandmould.report.robustness import RobustnessPages
 from sandmould.runs.templates import Note
@@ -40,7 +39,7 @@ class KindPages:
 
     template: str = "shell.html"
     """File of ``templates/report``."""
-    method: tuple[Row, ...] = ()
+    method: tuple[Note, ...] = ()
     ends: str = "the end of the run"
     """When measures are taken, where the objective names no time."""
     context: Mapping[str, Any] = field(default_factory=dict)

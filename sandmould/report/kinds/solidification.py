@@ -25,14 +25,13 @@ from sandmould.drawing.sphere_film import bare_film
 from sandmould.drawing.sphere_scene import SurfaceField, solid_scene
 from sandmould.kinds.solidification.kind import SolidificationStudy
 from sandmould.report.kinds.kind import Findings, FirstPicture, KindPages, KindReport
-from sandmould.report.method import Row
 from sandmould.report.tables import Cell, Column, Table
 from sandmould.report.time_series import curve_figures, measure_curves
 from sandmould.runs.columns import CPU_S, RUN, SOLIDIFICATION_TIME_S, TIME_S, finished
 from sandmould.runs.formatting import is_number, listed, name_of, number, seconds, setting_text
-from sandmould.runs.templates import notes, worded
+from sandmould.runs.templates import Note, notes, worded
 from sandmould.scenario.casting.shapes import Body
-from sandmould.scenario.casting.solidification import MouldMaterial, Solidification
+from sandmould.scenario.casting.solidification import Solidification
 from sandmould.statistics.answer import Answer
 from sandmould.statistics.refining import resolution_among
 from sandmould.statistics.verdict import rank_runs
@@ -297,28 +296,9 @@ def _error_table(errors: Sequence[_Error]) -> Table:
     return Table(columns, rows, (False,) * len(rows))
 
 
-def _method(scenario: Solidification, keys: Sequence[str]) -> tuple[Row, ...]:
+def _method(scenario: Solidification, keys: Sequence[str]) -> tuple[Note, ...]:
     """How the runs were computed; see ``sand_method``."""
-    metal, mould, initial = scenario.casting, scenario.mould, scenario.initial_k
-    transfer = scenario.heat_transfer_w_m2_k
-    return (
-        Row("Method", "adaptive resolution particles of Hirata and Anzai (2019) in "
-            f"{scenario.dimensions}D, and finite differences beside them; the box lets no heat "
-            "through"),
-        Row("Casting", f"{metal.name}: {_conducts(metal)}, latent heat "
-            f"{metal.latent_heat_j_kg / 1e3:g} kJ/kg from {metal.liquidus_k:g} to "
-            f"{metal.solidus_k:g} K; poured at {initial.casting:g} K"),
-        Row("Mould", f"{mould.name}: {_conducts(mould)}; at {initial.mould:g} K"),
-        Row("Interface", f"{transfer:g} W/m²/K" if transfer else "perfect contact"),
-        Row("Swept", listed([name_of(k) for k in keys], most=20) or "nothing"),
-    )  # fmt: skip
-
-
-def _conducts(it: MouldMaterial) -> str:
-    return (
-        f"{it.density_kg_m3:g} kg/m³, {it.heat_capacity_j_kg_k:g} J/kg/K, "
-        f"{it.conductivity_w_m_k:g} W/m/K"
-    )
+    return notes("freezing_method.j2", heat=scenario, swept=[name_of(key) for key in keys])
 
 
 REPORT = KindReport(_pages, _notes)

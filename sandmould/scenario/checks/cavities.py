@@ -129,18 +129,9 @@ def _of_place(s: Scenario, cavity: AnyCavity, space: Cavity, key: str) -> Iterat
 
 
 def free_share(s: Scenario, number: int) -> float:
-    """Share of a cavity that no obstacle fills: what facets leave of it among meshes.
+    """Share of a cavity that no obstacle fills: what facets leave of it among meshes, else 1.
 
-    Parameters
-    ----------
-    s : Scenario
-    number : int
-        Of the cavity, from 0.
-
-    Returns
-    -------
-    float
-        1 where no obstacle is a mesh.
+    ``number``: of the cavity, from 0.
     """
     if not s.scene.meshes:
         return 1.0

@@ -35,18 +35,9 @@ class ThinWall:
 
 
 def thinnest_wall(bodies: Sequence[Body], below_m: float) -> ThinWall | None:
-    """Find walls thinner than a limit.
+    """Find walls thinner than a limit; None where none is.
 
-    Parameters
-    ----------
-    bodies : sequence of Body
-        Parts that touch are one.
-    below_m : float, m
-
-    Returns
-    -------
-    ThinWall or None
-        None where no wall is thinner.
+    ``bodies``: parts that touch are one.
     """
     samples = [_surface(body, below_m) for body in bodies]
     place, normal, area = (np.concatenate(parts) for parts in zip(*samples, strict=True))

@@ -72,11 +72,6 @@ def calibrate(
 
     Parameters
     ----------
-    calibration : Calibration
-    summary : DataFrame
-        One row a run of the study's sweep.
-    keys : tuple of str
-        The two swept keys.
     others : mapping of study to DataFrame, optional
         Summaries of the studies that ``calibration.also`` names.
     """
@@ -143,10 +138,8 @@ def material_text(
     ----------
     calibrated : CalibratedSand
         With a posterior.
-    keys : tuple of str
     scenario : Scenario
         Of any run: all but the swept keys is the same.
-    study : str
     """
     assert calibrated.posterior is not None
     parts = {"sand", "contact", "background_damping"}

@@ -60,8 +60,6 @@ def plan_batches(
 
     Parameters
     ----------
-    runs : sequence of Run
-    wall_s : float, s
     cores : int
         That a job should have; runs that leave some of them free are computed side by side. One
         run under MPI has a job's cores for itself.
@@ -128,11 +126,8 @@ def mark_done(batches: Iterable[Batch], lacking: Container[str], folder: Path) -
 
     Parameters
     ----------
-    batches : iterable of Batch
     lacking : container of str
         Names of runs that lack something.
-    folder : Path
-        ``results/<study>``.
     """
     for batch in batches:
         if batch.runs[0].part == FILL:
@@ -150,13 +145,7 @@ def write_batches(batches: Iterable[Batch], folder: Path) -> None:
 
 
 def read_batches(runs: Iterable[Run], folder: Path) -> list[Batch]:
-    """Read what ``write_batches`` wrote: batches of some runs, those not listed any more left out.
-
-    Raises
-    ------
-    OSError, ValueError
-        When it cannot be read.
-    """
+    """Read what ``write_batches`` wrote: batches of some runs, those not listed left out."""
     by_name = {run.run: run for run in runs}
     batches = []
     for name, (beside, names) in read_json(folder / _LIST).items():

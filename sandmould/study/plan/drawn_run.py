@@ -16,12 +16,6 @@ from sandmould.study.plan.load_study import OpenStudy, open_study
 def drawn_run(path: Path, name: str | None = None) -> tuple[OpenStudy, Run]:
     """Open a study and choose a run of sand or of a casting; engine and measures are not asked for.
 
-    Parameters
-    ----------
-    path : Path
-    name : str, optional
-        Of the run; the first unless given.
-
     Raises
     ------
     BadInputError

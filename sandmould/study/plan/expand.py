@@ -51,7 +51,6 @@ def expand(
 
     Parameters
     ----------
-    study : OpenStudy
     more : sequence of (point, replicate)
         Runs that its rounds have added.
     certified_hz : sequence of float, Hz

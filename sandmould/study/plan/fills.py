@@ -24,8 +24,6 @@ def share_fills(runs: Sequence[Run], planning: Planning[Any]) -> tuple[list[Run]
     ----------
     runs : sequence of Run
         All of a study, those of earlier rounds included: what is appended shares with them.
-    planning : Planning
-        Of the study's kind.
 
     Returns
     -------

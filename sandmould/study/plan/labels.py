@@ -14,15 +14,7 @@ class Labels:
     """Labels of a study's points, each its own."""
 
     def __init__(self, scenario: type[Section], has_units: bool) -> None:
-        """Begin with none.
-
-        Parameters
-        ----------
-        scenario : type of Section
-            That of the scenario, which says what unit a key ends with.
-        has_units : bool
-            Whether the unit stands in the label.
-        """
+        """Begin with none."""
         self._scenario, self._has_units = scenario, has_units
         self._point: dict[str, Point] = {}
 
@@ -37,13 +29,7 @@ class Labels:
 def run_label(parameters: Point, scenario: type[Section], has_units: bool) -> str:
     """Names and values of at most three swept keys, in letters that any file system takes.
 
-    Parameters
-    ----------
-    parameters : Point
-    scenario : type of Section
-        That of the scenario, which says what unit a key ends with.
-    has_units : bool
-        Whether the unit stands in the label.
+    ``has_units``: whether the unit stands in the label.
     """
     keys = sorted(parameters)
     last = [key.rsplit(".", 1)[-1] for key in keys]

@@ -55,13 +55,8 @@ def lack_of(run: Run, folder: Path, template_hash: Callable[[Run], str] | None =
 
     A failed run lacks nothing: it has its outcome, and only ``sandmould again`` forgets that.
 
-    Parameters
-    ----------
-    run : Run
-    folder : Path
-        Its own, see ``Run.place``.
-    template_hash : callable, optional
-        Hash of what turns a run into its deck, for a caller that keeps it; see ``Planning``.
+    ``template_hash``: hash of what turns a run into its deck, for a caller that keeps it; see
+    ``Planning``.
     """
     wanted = template_hash or _template_hash
     try:
@@ -125,14 +120,7 @@ def _template_hash(run: Run) -> str:
 
 
 def lacks(runs: Iterable[Run], folder: Path) -> dict[str, Lack]:
-    """What each of some runs lacks, by its name; whole ones are left out.
-
-    Parameters
-    ----------
-    runs : iterable of Run
-    folder : Path
-        ``results/<study>``.
-    """
+    """What each of some runs lacks, by its name; whole ones are left out."""
     template_hash = template_hashes()
     found = {run.run: lack_of(run, folder / run.place, template_hash) for run in runs}
     return {run: lack for run, lack in found.items() if lack.need}
@@ -165,12 +153,8 @@ def note_lacks(runs: Iterable[Run], found: dict[str, Lack], folder: Path) -> str
 
     Parameters
     ----------
-    runs : iterable of Run
-        All runs.
     found : dict
         What those that are not whole lack, see ``lacks``.
-    folder : Path
-        ``results/<study>``.
 
     Returns
     -------

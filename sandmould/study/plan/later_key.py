@@ -20,7 +20,6 @@ def at_later_key(
 
     Parameters
     ----------
-    problem : Problem
     files : sequence of StudyFile
         The study's own last, each after the one that it is based on.
     misfits : callable

@@ -89,24 +89,7 @@ class StudyFile:
 
 
 def open_study(path: Path, text: str | None = None) -> OpenStudy:
-    """Read a study with all that it is based on, and check it.
-
-    Parameters
-    ----------
-    path : Path
-        Its stem is the study's name.
-    text : str, optional
-        What its file will hold, where it is not written yet.
-
-    Returns
-    -------
-    OpenStudy
-
-    Raises
-    ------
-    BadInputError
-        With one line a problem, each naming the file that holds the bad value.
-    """
+    """Read a study with all that it is based on, and check it."""
     return study_of(study_files(path, text))
 
 
@@ -211,13 +194,7 @@ def _check_material(material: StudyFile, model: type[BaseModel]) -> None:
 
 
 def materials(model: type[BaseModel]) -> list[str]:
-    """Names of the materials that a kind of study can use.
-
-    Parameters
-    ----------
-    model : type
-        What a material of that kind states.
-    """
+    """Names of the materials that a kind of study can use."""
     names = set()
     for path in _yaml_files(MATERIALS):
         with contextlib.suppress(BadInputError):

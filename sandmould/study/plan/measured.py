@@ -26,15 +26,7 @@ def measured_in(study: Study, kind: Kind[Any], scenario: AnyScenario) -> list[Me
 
 
 def problems(study: Study, kind: Kind[Any], scenario: AnyScenario) -> Iterator[Problem]:
-    """List the measures asked for that a scene of a study will not have.
-
-    Parameters
-    ----------
-    study : Study
-    kind : Kind
-    scenario : scenario of any kind
-        At one point of the sweep.
-    """
+    """List the measures asked for that a scene of a study will not have."""
     has = [measure.name for measure in measured_in(study, kind, scenario) if measure.is_number]
     yield from own_measures.problems_in_scene(
         study.own_measures, has[: len(has) - len(study.own_measures)]
@@ -49,14 +41,7 @@ def problems(study: Study, kind: Kind[Any], scenario: AnyScenario) -> Iterator[P
 
 
 def problems_elsewhere(study: Study, results: Path) -> Iterator[Problem]:
-    """List what keeps a study from calibrating with the results of others.
-
-    Parameters
-    ----------
-    study : Study
-    results : Path
-        Folder of all results.
-    """
+    """List what keeps a study from calibrating with the results of others."""
     for i, name in enumerate(study.calibration.also):
         summary = results / name / "summary.tsv"
         if not summary.is_file():

@@ -79,13 +79,8 @@ def write_plan(runs: Sequence[Run], folder: Path) -> None:
     before it is computed, see ``write_run``. Folders of runs that are no longer listed stay, since
     they may hold results.
 
-    Parameters
-    ----------
-    runs : sequence of Run
-        All runs of the study, those of earlier rounds included, and the fills that they share;
-        fills are no rows.
-    folder : Path
-        ``results/<study>``.
+    ``runs``: all runs of the study, those of earlier rounds included, and the fills that they
+    share; fills are no rows.
     """
     for run in runs:
         if (folder / run.place / SCENARIO_FILE).exists():
@@ -100,19 +95,7 @@ def write_plan(runs: Sequence[Run], folder: Path) -> None:
 
 
 def write_run(run: Run, folder: Path) -> Path:
-    """Write the ``scenario.yaml`` of a run that is to be computed, unless it says so already.
-
-    Parameters
-    ----------
-    run : Run
-    folder : Path
-        ``results/<study>``.
-
-    Returns
-    -------
-    Path
-        The run's own folder.
-    """
+    """Write the ``scenario.yaml`` of a run that is to be computed, unless it says so already."""
     place = folder / run.place
     kind = kind_of(run.scenario).name
     file = _file_model(kind)(kind=kind, **{name: getattr(run, name) for name in _OF_RUN})
@@ -157,14 +140,7 @@ def _table_text(runs: Sequence[Run]) -> str:
 
 
 def plan_rows(runs: Sequence[Run], prices: Prices) -> list[dict[str, Any]]:
-    """What the runs of a study will take, a row a run; units stand in the names.
-
-    Parameters
-    ----------
-    runs : sequence of Run
-        All runs of the study, with the fills that they share.
-    prices : Prices
-    """
+    """What the runs of a study will take, a row a run; units stand in the names."""
     keys = list(dict.fromkeys(key for run in runs for key in run.parameters))
     work = kind_of(runs[0].scenario).planning.work_unit.replace("-", "_")
     return [
@@ -203,15 +179,7 @@ def read_run(path: Path) -> Run:
 
 
 def plan_table(runs: Sequence[Run], prices: Prices, cores: int) -> str:
-    """What the runs of a study will take, as text.
-
-    Parameters
-    ----------
-    runs : sequence of Run
-    prices : Prices
-    cores : int
-        Cores that share the runs.
-    """
+    """What the runs of a study will take, as text."""
     points: dict[tuple[Any, ...], list[Run]] = {}
     for run in runs:
         # Fills of one size are one point; runs of a point may share a fill or not.
@@ -271,12 +239,8 @@ def beyond_line(left_out: Sequence[Point]) -> str:
 def later_lines(later: Sequence[Run], prices: Prices, cores: int) -> str:
     """What controls of the best setting will take, a line a sort; empty where none are to come.
 
-    Parameters
-    ----------
-    later : sequence of Run
-        At settings in place of those that are not known yet, with the fills that come with them.
-    prices : Prices
-    cores : int
+    ``later``: at settings in place of those that are not known yet, with the fills that come with
+    them.
     """
     runs = [run for run in later if run.part != FILL]
     of_springs = sum(SPRINGS in run.part for run in runs)

@@ -89,7 +89,6 @@ def ratios_of(
     ----------
     finished : iterable of (Run, float)
         Runs with the wall time of their computation in s.
-    rate_per_s : mapping of SpeedClass to float
     """
     found: dict[SpeedClass, list[float]] = {}
     for run, wall_s in finished:

@@ -32,10 +32,7 @@ class Contenders:
     def more(self, runs: int) -> tuple[tuple[Point, int], ...]:
         """Bring the contenders to equally many replicates; where they are, to one more.
 
-        Parameters
-        ----------
-        runs : int
-            Most that are added; the nearest to the best come first.
+        ``runs``: the most that are added; the nearest to the best come first.
         """
         fewest, most = min(self.replicates), max(self.replicates)
         goal = most if fewest < most else most + 1
@@ -48,23 +45,12 @@ class Contenders:
 
 
 def find_contenders(summary: pd.DataFrame, study: Study, keys: list[str]) -> Contenders | None:
-    """Find the settings that are not ruled out by the runs so far.
+    """Find the settings that runs so far do not rule out; None where no two can be compared.
 
     Settings are compared as in the report, so that one that gets no more runs is one that the
     report calls worse.
 
-    Parameters
-    ----------
-    summary : DataFrame
-        One row a run of the sweep and of all rounds so far.
-    study : Study
-    keys : list of str
-        Swept keys.
-
-    Returns
-    -------
-    Contenders or None
-        None where no two settings can be compared.
+    ``summary``: one row a run of the sweep and of all rounds so far.
     """
     objective = study.objective
     verdict = compare_settings(summary, keys, objective.measure, objective.better)
@@ -96,14 +82,7 @@ def best_points(summary: pd.DataFrame, study: Study, keys: list[str]) -> tuple[P
 
 
 def why_decided(contenders: Contenders, half_width: float | None) -> str:
-    """Say why no more replicates are due; empty where they are.
-
-    Parameters
-    ----------
-    contenders : Contenders
-    half_width : float, optional
-        That is small enough.
-    """
+    """Say why no more replicates are due; empty where they are."""
     if len(contenders.points) == 1:
         return "One setting is left: all others are ruled out."
     if half_width is not None and contenders.half_width <= half_width:

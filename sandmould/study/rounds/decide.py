@@ -20,17 +20,7 @@ from sandmould.study.rounds.round_log import Round, RoundLog
 
 
 def next_runs(log: RoundLog, study: Study, summary: pd.DataFrame, keys: list[str]) -> RoundLog:
-    """Add what comes next: a round, or, once they have ended, the controls of the optimum.
-
-    Parameters
-    ----------
-    log : RoundLog
-    study : Study
-    summary : DataFrame
-        One row a run of the sweep and of all rounds so far.
-    keys : list of str
-        Swept keys.
-    """
+    """Add what comes next: a round, or, once they have ended, the controls of the optimum."""
     # Runs of the controls lie beyond the sweep: they must not open what has ended, or all
     # controls are computed again round another optimum.
     of_rounds = _of_rounds(log, study, summary, keys)
@@ -145,9 +135,6 @@ def why_over(refine: Refinement, done: int, spent_h: float, round_h: float) -> s
 
     Parameters
     ----------
-    refine : Refinement
-    done : int
-        Rounds so far.
     spent_h, round_h : float, h
         Processor time of all runs so far, and of the next round.
     """

@@ -15,7 +15,8 @@ from sandmould.scenario.drive import BoxDrive
 from sandmould.scenario.vibration import STANDARD_GRAVITY_M_S2
 from sandmould.statistics.answer import Asked, Decided
 from sandmould.statistics.decision import Evidence, decide
-from sandmould.study.plan.build_plan import Plan, open_plan, price
+from sandmould.study.plan.announcement import price
+from sandmould.study.plan.build_plan import Plan, open_plan
 from sandmould.wording.answer import limit_sentences
 from sandmould.wording.next_steps import answer_steps
 from tests.answered import FILL, HZ, SHARE, table

@@ -18,7 +18,6 @@ from sandmould.definition.run import Run
 from sandmould.digest import digest, file_digest
 from sandmould.engines.snapshot import Snapshot
 from sandmould.engines.snapshot_file import SNAPSHOTS, SnapshotFile, stored_snapshots
-from sandmould.execution.packs import recorded
 from sandmould.execution.packs.pack import pack
 from sandmould.execution.packs.unpack import unpack
 from sandmould.kinds.registry import kind_of
@@ -152,33 +151,6 @@ def test_what_is_not_whole_is_left_out_with_its_reason(packed: Path) -> None:
     (stopped / MANIFEST_FILE).unlink()
     with pytest.raises(BadInputError, match="are not at their end"):
         pack(plan, RESULTS)
-
-
-def test_the_record_of_a_shipped_study_is_taken_up_where_it_fits(
-    packed: Path, monkeypatch: pytest.MonkeyPatch, tmp_path: Path
-) -> None:
-    study = tmp_path / "config" / "studies" / "two.yaml"
-    study.parent.mkdir(parents=True)
-    shutil.copy("two.yaml", study)
-    monkeypatch.setattr(recorded, "SHIPPED", tmp_path)
-    monkeypatch.setattr(recorded, "RECORDS", tmp_path / "records")
-    unpack(packed, RESULTS)
-    plan = open_plan(study)
-    shutil.rmtree(run_folder(plan, 1))
-    said = recorded.record_part(plan, RESULTS)
-    assert "1 runs" in said
-    assert f"left out: {plan.runs[1].run}, not at its end" in said
-    shutil.rmtree(RESULTS)
-    plan, said = recorded.take_up(plan, RESULTS)
-    assert said == "1 runs taken from the record of two"
-    assert list(plan.lacks(RESULTS)) == [plan.runs[1].run]
-    assert recorded.take_up(plan, RESULTS)[1] == ""
-    # A study that has changed since takes none: it would be computed again.
-    shutil.rmtree(RESULTS)
-    study.write_text(study.read_text().replace("until_s: 100", "until_s: 101"))
-    assert recorded.take_up(open_plan(study), RESULTS)[1] == ""
-    # A user's study of the same name has no record.
-    assert recorded.take_up(open_plan(Path("two.yaml")), RESULTS)[1] == ""
 
 
 Members = dict[str, bytes]

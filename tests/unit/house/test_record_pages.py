@@ -10,7 +10,7 @@ import pytest
 
 from benchmarks.house.record_pages import RECORD, RecordPage, index_text, pages
 from sandmould import ROOT
-from sandmould.execution.packs.recorded import RECORDS
+from sandmould.execution.records import RECORDS
 
 PAGES = pages()
 LARGEST = 5_000_000

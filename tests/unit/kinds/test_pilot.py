@@ -10,14 +10,9 @@ import pytest
 
 from sandmould.bad_input import BadInputError
 from sandmould.kinds.deck import speed
-from sandmould.study.plan import build_plan
-from sandmould.study.plan.build_plan import (
-    Plan,
-    announce,
-    measure_speeds,
-    open_plan,
-    stored_speeds,
-)
+from sandmould.study.plan import announcement
+from sandmould.study.plan.announcement import announce, measure_speeds, stored_speeds
+from sandmould.study.plan.build_plan import Plan, open_plan
 from sandmould.study.plan.price import Prices
 from sandmould.user_cache import user_cache
 
@@ -208,9 +203,9 @@ def test_finished_runs_price_a_deck(tmp_path: Path, monkeypatch: pytest.MonkeyPa
     plan = short(tmp_path, 2000)
     ended = tmp_path / plan.study.name / plan.runs[0].place
     monkeypatch.setattr(
-        build_plan, "computed_wall_s", lambda folder: 240.0 if folder == ended else math.nan
+        announcement, "computed_wall_s", lambda folder: 240.0 if folder == ended else math.nan
     )
-    prices = build_plan.known_prices(plan, tmp_path)
+    prices = announcement.known_prices(plan, tmp_path)
     assert prices.basis(plan.runs) == "by finished runs"
     other = plan.runs[-1]
     assert prices.engine_s(other) == prices.work(other) == pytest.approx(240.0)

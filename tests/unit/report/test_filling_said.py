@@ -34,5 +34,5 @@ GRAIN = {"position_m": [0.02, 0.05], "diameter_m": tube_scene().largest_diameter
 def test_the_way_of_filling_is_said(fill: dict[str, Any], said: str) -> None:
     scene = tube_scene(fill={"layers": LAYERS} | fill)
     summary = pd.DataFrame({"seed": [1]})
-    (text,) = (row.text for row in sand_method(scene, [], summary) if row.term == "Filling")
+    (text,) = (row.text for row in sand_method(scene, [], summary) if row.about == "Filling")
     assert text.startswith(said)

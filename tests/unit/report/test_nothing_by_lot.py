@@ -25,4 +25,4 @@ def test_it_asks_for_no_replicates(
     page = (folder / "report.html").read_text(encoding="utf-8")
     assert "replicates: " not in page
     assert "Fewer than 3 runs" not in page
-    assert "Nothing is drawn by lot, so a setting is one run" in page
+    assert "Nothing is random, so a setting is one run" in page

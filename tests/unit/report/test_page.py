@@ -146,7 +146,7 @@ def test_a_table_without_rows_vanishes() -> None:
 
 def test_what_differs_from_run_to_run_is_no_origin_of_all() -> None:
     rows = provenance_rows([{"command": f"run {n}", "versions": {"numpy": "2"}} for n in (1, 2)])
-    assert [(row.term, row.text) for row in rows] == [("versions: numpy", "2")]
+    assert [(row.about, row.text) for row in rows] == [("versions: numpy", "2")]
 
 
 def test_headings_link_to_sections(text: str) -> None:

@@ -19,7 +19,7 @@ SUMMARY = pd.DataFrame({
 
 def time_step_row(summary: pd.DataFrame) -> str:
     scene = tube_scene(engine={"name": "reference"}, time_step={"bed_fraction": 0.7})
-    rows = {row.term: row.text for row in sand_method(scene, [], summary)}
+    rows = {row.about: row.text for row in sand_method(scene, [], summary)}
     return rows["Time step"]
 
 

@@ -21,7 +21,8 @@ from sandmould.scenario.box import Tube
 from sandmould.scenario.scenario import Scenario
 from sandmould.statistics.robustness import Robustness, assess_robustness
 from sandmould.statistics.spring_dependence import assess_springs
-from sandmould.study.plan.build_plan import open_plan, price
+from sandmould.study.plan.announcement import price
+from sandmould.study.plan.build_plan import open_plan
 from sandmould.study.plan.expand import expand
 from sandmould.study.plan.fills import share_fills
 from sandmould.study.plan.load_study import OpenStudy, open_study

@@ -19,7 +19,8 @@ from sandmould.runs.columns import CPU_S, FILL_CPU_S, FILL_WALL_S, total_s
 from sandmould.runs.formatting import size_text
 from sandmould.runs.manifest import save_manifest
 from sandmould.study.collect import shares_of_fills
-from sandmould.study.plan.build_plan import Plan, announce, open_plan, prepare
+from sandmould.study.plan.announcement import announce, prepare
+from sandmould.study.plan.build_plan import Plan, open_plan
 from sandmould.study.plan.expand import expand
 from sandmould.study.plan.fills import own_work, predicted_s, share_fills
 from sandmould.study.plan.lacking import Need

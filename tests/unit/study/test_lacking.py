@@ -13,7 +13,8 @@ import pytest
 from sandmould.execution.simulate import measure_run
 from sandmould.execution.status import run_status, status_text
 from sandmould.runs.manifest import LEFT_OUT, MANIFEST_FILE
-from sandmould.study.plan.build_plan import RESULTS, Plan, open_plan, prepare
+from sandmould.study.plan.announcement import prepare
+from sandmould.study.plan.build_plan import RESULTS, Plan, open_plan
 from sandmould.study.plan.lacking import WHOLE, Lack, Need, lack_of, notes_of
 from tests.finished_study import finished_study, study_text
 from tests.workflow.runs import compute_all

@@ -26,8 +26,9 @@ from sandmould.scenario.scenario import Scenario
 from sandmould.scenario.stages import stage_kind
 from sandmould.scenario.vibration import STOP_PERIODS
 from sandmould.study.plan import plan_files
+from sandmould.study.plan.announcement import announce, measure_speeds
 from sandmould.study.plan.batches import START_S
-from sandmould.study.plan.build_plan import announce, measure_speeds, open_plan
+from sandmould.study.plan.build_plan import open_plan
 from sandmould.study.plan.expand import expand
 from sandmould.study.plan.load_study import open_study
 from sandmould.study.plan.plan_files import plan_table, read_run
@@ -260,7 +261,10 @@ def test_long_table_is_cut(tmp_path: Path) -> None:
         # scikit-learn and scipy.stats take a second each.
         ("sandmould.execution.simulate", ("sklearn", "scipy.stats", "matplotlib", "snakemake")),
         ("sandmould.execution.jobs", ("sklearn", "scipy.stats", "snakemake")),
-        ("sandmould.study.plan.build_plan", ("sklearn", "scipy.stats", "matplotlib", "snakemake")),
+        (
+            "sandmould.study.plan.announcement",
+            ("sklearn", "scipy.stats", "matplotlib", "snakemake"),
+        ),
     ],
 )
 def test_jobs_do_not_wait_for_libraries_of_the_report(module: str, heavy: tuple[str, ...]) -> None:

@@ -17,11 +17,7 @@ _OF_USER = re.compile(r"^[vcf]_\w+$")
 def column_problems(scenario: OwnDeck, deck: str) -> Iterator[Problem]:
     """Tell columns that a rendered deck, by its text alone, will not print.
 
-    Parameters
-    ----------
-    scenario : OwnDeck
-    deck : str
-        As the engine reads it at the beginning.
+    ``deck``: as the engine reads it at the beginning.
     """
     printed = _printed(deck)
     if printed is None:
@@ -58,14 +54,7 @@ def _commands(deck: str) -> Iterator[list[str]]:
 
 
 def missing_columns(scenario: OwnDeck, columns: Sequence[str]) -> str:
-    """Say which columns a log lacks, or nothing.
-
-    Parameters
-    ----------
-    scenario : OwnDeck
-    columns : sequence of str
-        Those that it has.
-    """
+    """Say which columns a log lacks, or nothing."""
     wanted = {"the time": CLOCK, **{f"measures.{n}": c for n, c in scenario.columns.items()}}
     lacks = [f"{column} ({what})" for what, column in wanted.items() if column not in columns]
     if not lacks:

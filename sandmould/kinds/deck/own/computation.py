@@ -45,10 +45,8 @@ def compute(scenario: OwnDeck, folder: Path, run: str, study: str) -> Computed:
 
     Parameters
     ----------
-    scenario : OwnDeck
     folder : Path
         The run's, with its deck where that is rendered; it runs in ``work/output``.
-    run, study : str
 
     Raises
     ------

@@ -115,8 +115,6 @@ def render(scenario: OwnDeck, run: str, study: str, restart: str = "") -> str:
 
     Parameters
     ----------
-    scenario : OwnDeck
-    run, study : str
     restart : str
         Restart file that the deck is to go on from; empty at the beginning.
 
@@ -149,12 +147,7 @@ def template_text(scenario: OwnDeck) -> str:
 
 
 def check_unchanged(scenario: OwnDeck, is_rendered: bool = False) -> None:
-    """See that files are those of the plan, and the template unless its deck is there.
-
-    Raises
-    ------
-    BadInputError
-    """
+    """See that files are those of the plan, and the template unless its deck is there."""
     now = scenario.sha256 | with_file_hashes(scenario).sha256
     if not is_rendered:
         now = with_deck_hash(with_file_hashes(scenario)).sha256

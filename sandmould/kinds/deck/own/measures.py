@@ -17,13 +17,7 @@ from sandmould.scenario.own_deck import CLOCK, OwnDeck, Taken
 def measured(scenario: OwnDeck, table: pd.DataFrame, output: Path) -> pd.DataFrame:
     """Measures by name, one row a row of the log; those that cannot be read are left out.
 
-    Parameters
-    ----------
-    scenario : OwnDeck
-    table : DataFrame
-        The log.
-    output : Path
-        Folder that the deck writes its dumps into.
+    ``output``: folder that the deck writes its dumps into.
     """
     found = {}
     time_s = table[CLOCK].to_numpy() if CLOCK in table else np.full(len(table), np.nan)

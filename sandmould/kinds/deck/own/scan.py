@@ -124,13 +124,7 @@ def _of_file(path: Path, is_template: bool) -> Iterator[str]:
 def findings(file: str, text: str, is_template: bool = False) -> Iterator[Finding]:
     """Find commands that reach beyond the run's folder, or may.
 
-    Parameters
-    ----------
-    file : str
-        Name in the findings.
-    text : str
-    is_template : bool
-        Whether Jinja's statements stand in it.
+    ``is_template``: whether Jinja's statements stand in it.
     """
     if is_template:
         text = _STATEMENT.sub(lambda m: "\n" * m[0].count("\n"), text)

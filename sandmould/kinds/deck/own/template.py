@@ -38,11 +38,6 @@ class TemplateError(ValueError):
 def names_in(template: str) -> frozenset[str]:
     """Names that a template takes from outside.
 
-    Parameters
-    ----------
-    template : str
-        Its text.
-
     Raises
     ------
     TemplateError
@@ -55,8 +50,6 @@ def rendered(template: str, values: Mapping[str, Any]) -> str:
 
     Parameters
     ----------
-    template : str
-        Its text.
     values : mapping of str to any
         What JSON can hold.
 

@@ -37,10 +37,7 @@ def read_thermo(logs: Sequence[Path]) -> Thermo:
 
     Rows of an attempt from the step on at which the next one begins are left out.
 
-    Parameters
-    ----------
-    logs : sequence of Path
-        One an attempt.
+    ``logs``: one an attempt.
     """
     together = pd.DataFrame(columns=[STEP])
     grain_steps = loop_s = 0.0
