@@ -14,7 +14,7 @@ from tests.verification.cases.bench import RADIUS_M, Array, Bench, law, scene
 from tests.verification.cases.case import RefusedCase
 
 SPEED_M_S = 2e-3
-"""So slow that the normal at an edge hardly turns while the grain touches: overlaps of 5e-4 radii."""
+"""So slow that the normal at an edge hardly turns during a contact: overlaps of 5e-4 radii."""
 HALF_M, TOP_M, MIDDLE_M = 0.02, 0.07, 0.1
 OFFSETS = {
     "face": (0.5 * HALF_M, -0.3 * HALF_M), "seam": (0.0, 0.0),
