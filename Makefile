@@ -55,7 +55,8 @@ quick: $(INSTALLED)
 	@$(MAKE) --no-print-directory -j 2 --output-sync=target lint fast-tests
 
 ## lint, types, import contract and all tests
-test: lint
+test: $(INSTALLED)
+	@$(MAKE) --no-print-directory -j 2 --output-sync=target lint
 	@$(MAKE) --no-print-directory all-tests
 
 all-tests: $(INSTALLED)

@@ -13,6 +13,7 @@ from typing import Any, TypeVar
 
 import numba
 from llvmlite import binding
+from numba.core.caching import UserProvidedCacheLocator
 
 from sandmould.kernel_cache import cache_folder, is_own
 
@@ -34,6 +35,15 @@ numba.config.CACHE_DIR = str(FOLDER)  # type: ignore[attr-defined]
 binding.set_option("sandmould", "-align-all-functions=6")
 
 
+class OfAModule(UserProvidedCacheLocator):
+    """A folder for each module, not for each path: other copies of the house find it too."""
+
+    def __init__(self, function: Any, file: str) -> None:
+        super().__init__(function, file)
+        self._cache_path = str(FOLDER / function.__module__)
+
+
+numba.config.CACHE_LOCATOR_CLASSES = f"{__name__}.OfAModule"  # type: ignore[attr-defined]
 DISPATCHERS: dict[str, Any] = {}
 """Functions that this process may call on one thread, by module and name."""
 

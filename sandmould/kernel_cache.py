@@ -123,4 +123,4 @@ def are_compiled(room: str) -> bool:
 
     To find whether those of today were takes a tenth of a second.
     """
-    return any(user_cache().glob(f"kernels-*/{room}_*/*.nbi"))
+    return any(user_cache().glob(f"kernels-*/*.{room}.*/*.nbi"))

@@ -14,7 +14,8 @@ from tests.fuzz.mutate import mutated
 from tests.fuzz.readers import READERS, Reader
 from tests.fuzz.watched import Watched
 
-SECONDS = 60.0
+SECONDS = 25.0
+"""`make fuzz` reads for an hour."""
 
 
 @pytest.fixture(scope="module")
@@ -45,7 +46,7 @@ def test_damaged_files_are_read_or_refused(watched: Watched) -> None:
     count, found = fuzz(watched, SECONDS, seed=1)
     assert [(f.reader, f.what.splitlines()[-1]) for f in found] == []
     # A reader that is seldom asked is not tested: one that is slow would stop the others.
-    assert min(count.values()) > 20
+    assert min(count.values()) > 8
 
 
 @pytest.mark.slow

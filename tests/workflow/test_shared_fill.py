@@ -141,7 +141,6 @@ def plank_on(make: Callable[..., Scenario], **loop: Any) -> Scenario:
         "pattern": {**PLANK["pattern"], "loop": loop},
         "fill": {"layers": [{"count": 10}]},
         "vibration": [{"acceleration_g": 0.5, "frequency_hz": 15.0, "duration_s": 0.02}],
-        "rest": SOON,
     }
     return with_surface(make(**{**plank, **changes}))
 

@@ -24,9 +24,9 @@ STUDY = """\
 based_on: tube
 scenario:
   engine: {name: reference}
-  sand: {size_scale: 9, size_classes: 3, disc_thickness_m: 0.1}
+  sand: {size_scale: 10, size_classes: 3, disc_thickness_m: 0.1}
   time_step: {fraction: 0.8}
-  vibration: [{frequency_hz: 50, acceleration_g: 1.5, duration_s: 1.0}]
+  vibration: [{frequency_hz: 50, acceleration_g: 1.5, duration_s: 0.6}]
   record: {snapshot_every_s: 0.1}
 sweep: {keys: {vibration.0.frequency_hz: [50, 100]}}
 replicates: 2
@@ -121,7 +121,8 @@ def call(slurm: SlurmNode, folder: Path, *command: str) -> subprocess.CompletedP
 def test_without_shared_jobs_each_asks_what_the_partition_gives(
     slurm: SlurmNode, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    folder, log = study_folder(tmp_path / "study", STUDY), tmp_path / "log"
+    short = STUDY.replace("size_scale: 10", "size_scale: 16").replace("0.6}", "0.1}")
+    folder, log = study_folder(tmp_path / "study", short), tmp_path / "log"
     monkeypatch.chdir(folder)
     run = open_plan(Path("small.yaml")).runs[0]
     alone = [each.replace("batch_wall_s=8", "batch_wall_s=0") for each in COMMAND]

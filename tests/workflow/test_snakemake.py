@@ -25,8 +25,9 @@ STUDIES = sorted((ROOT / "config" / "studies").glob("*.yaml"))
 TINY = """\
 based_on: tube
 scenario:
-  sand: {size_scale: 12, size_classes: 3, disc_thickness_m: 0.1}
+  sand: {size_scale: 16, size_classes: 3, disc_thickness_m: 0.1}
   time_step: {fraction: 0.8}
+  rest: {rms_speed_m_s: 0.05, load_tolerance: 0.1, checks: 3}
   vibration: [{frequency_hz: 50, acceleration_g: 1.5, duration_s: 0.06}]
   record: {snapshot_every_s: 0.02}
 """
@@ -173,7 +174,7 @@ def test_point_of_a_sweep_on_two_engines(checkout: Path) -> None:
         "cross_check: {engine: liggghts, at: {sand.disc_inertia: sphere}, replicates: 2}\n"
         "equivalence: {margins: {solid_fraction: 0.05}}\n"
     )
-    refused = snakemake("--configfile", str(study), folder=checkout)
+    refused = dry_run("--cores", "2", "--configfile", str(study), folder=checkout)
     assert refused.returncode != 0
     assert "on engine liggghts" in refused.stderr
     study.write_text(study.read_text().replace("engine: liggghts", "engine: lammps"))
@@ -262,7 +263,7 @@ def test_bad_input_is_one_sentence_and_starts_nothing(
 ) -> None:
     study = checkout / "bad.yaml"
     study.write_text("based_on: tube\n" + text)
-    ran = snakemake("--configfile", str(study), folder=checkout)
+    ran = dry_run("--cores", "2", "--configfile", str(study), folder=checkout)
     assert ran.returncode != 0
     said = [line for line in ran.stderr.splitlines() if line and "profile" not in line]
     assert len(said) == 1, ran.stderr

@@ -141,6 +141,11 @@ def test_what_is_compiled_is_kept_for_the_next_process(
     assert {path: path.stat().st_mtime_ns for path in (house / "cache").rglob("*.nbc")} == kept
     monkeypatch.setenv("XDG_CACHE_HOME", str(house / "cache"))
     assert (are_compiled("arpm"), are_compiled("dem")) == (True, False)
+    # A copy of the same sources in another place, such as an installed wheel, finds it too.
+    other = house.rename(house.with_name("other"))
+    printed(other, ARPM)
+    files = {path.relative_to(other / "cache"): path for path in (other / "cache").rglob("*.nbc")}
+    assert {house / "cache" / name: path.stat().st_mtime_ns for name, path in files.items()} == kept
 
 
 def test_kernels_of_one_source_are_kept_under_names_of_their_own() -> None:

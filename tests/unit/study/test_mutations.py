@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import copy
+import functools
 import json
 import math
 import tempfile
@@ -153,16 +154,19 @@ def opens_or_tells(data: bytes) -> None:
             assert runs
 
 
+@functools.cache
 def resolved(study: Path) -> Any:
     """Give the resolved scenario of a shipped study as a tree."""
     return open_study(study).study.scenario.model_dump(mode="json")
 
 
-SCENARIOS = {study: resolved(study) for study in STUDIES}
-NUMBERS = {
-    study: [key for key in key_paths(tree) if type(value_at(tree, key)) in (int, float)]
-    for study, tree in SCENARIOS.items()
-}
+@functools.cache
+def numbers(study: Path) -> list[str]:
+    """Keys of the scenario of a shipped study that hold a number."""
+    tree = resolved(study)
+    return [key for key in key_paths(tree) if type(value_at(tree, key)) in (int, float)]
+
+
 TEXT = st.text(st.characters(exclude_categories=["Cs"]), max_size=60)
 magnitudes = st.one_of(
     st.floats(-6, 3).map(lambda e: 10.0**e),
@@ -177,8 +181,8 @@ def scaled_studies(draw: st.DrawFn) -> Any:
     """A shipped study with numbers of its scenario changed or swept by orders of magnitude."""
     chosen = draw(st.sampled_from(STUDIES))
     tree: Any = {"based_on": chosen.stem, "sweep": {"keys": {}}}
-    scenario = copy.deepcopy(SCENARIOS[chosen])
-    for key in draw(st.lists(st.sampled_from(NUMBERS[chosen]), min_size=1, max_size=3)):
+    scenario = copy.deepcopy(resolved(chosen))
+    for key in draw(st.lists(st.sampled_from(numbers(chosen)), min_size=1, max_size=3)):
         if draw(st.booleans()):
             above, _, last = key.rpartition(".")
             (value_at(scenario, above) if above else scenario)[last] = draw(magnitudes)
@@ -210,7 +214,12 @@ def test_mutated_study_opens_or_tells(tree: Any) -> None:
 
 
 @pytest.mark.slow
-@settings(max_examples=150, deadline=None, derandomize=True)
+@settings(
+    max_examples=150,
+    deadline=None,
+    derandomize=True,
+    suppress_health_check=[HealthCheck.too_slow],
+)
 @given(tree=scaled_studies())
 def test_scaled_study_opens_or_tells(tree: Any) -> None:
     opens_or_tells(yaml.safe_dump(tree).encode())
