@@ -14,6 +14,7 @@ import numpy as np
 from numba import prange, set_num_threads
 
 from sandmould.arrays import Floats
+from sandmould.casting.arpm.exchange import resistances
 from sandmould.casting.arpm.marching import STEP_SHARE, Heat
 from sandmould.casting.arpm.material import EnthalpyTable, temperature_of
 from sandmould.casting.arpm.raster import Raster
@@ -44,7 +45,7 @@ class DifferenceSteps:
         raster: Raster,
         table: EnthalpyTable,
         conductivity_w_m_k: Floats,
-        resistance_m2k_w: float,
+        resistance_m2k_w: float | Floats,
         share: float = STEP_SHARE,
         threads: int = 1,
     ) -> None:
@@ -55,7 +56,7 @@ class DifferenceSteps:
         raster : Raster
         table : EnthalpyTable
         conductivity_w_m_k : (m,) float64, W/m/K
-        resistance_m2k_w : float, m2 K/W
+        resistance_m2k_w : float or (m, m) float64, m2 K/W
         share : float
             Of the longest stable step.
         threads : int
@@ -63,9 +64,9 @@ class DifferenceSteps:
         # a plane is a box of one layer
         shape = (1,) * (3 - raster.material.ndim) + raster.material.shape
         material = raster.material.reshape(shape)
+        resistance = resistances(resistance_m2k_w, len(conductivity_w_m_k))
         along_x, along_y, along_z = (
-            _between(material, axis, raster, conductivity_w_m_k, resistance_m2k_w)
-            for axis in range(3)
+            _between(material, axis, raster, conductivity_w_m_k, resistance) for axis in range(3)
         )
         rate = np.zeros(shape)
         for axis, along in enumerate((along_x, along_y, along_z)):
@@ -95,13 +96,13 @@ class DifferenceSteps:
         heat.element_steps += steps * self._grid.material.size
 
 
-def _between(material: Any, axis: int, raster: Raster, conductivity: Floats, resistance: float
+def _between(material: Any, axis: int, raster: Raster, conductivity: Floats, resistance: Floats
              ) -> Floats:  # fmt: skip
     """Rate (W/K over a whole cell's volume) between each cell and the next; 0 behind the last."""
     rate, cell_m, n = np.zeros(material.shape), raster.cell_m, material.shape[axis]
     before, after = (np.take(material, range(k, n - 1 + k), axis=axis) for k in (0, 1))
     path = 0.5 * cell_m / conductivity[before] + 0.5 * cell_m / conductivity[after]
-    path += np.where(before != after, resistance, 0.0)
+    path += resistance[before, after]
     inner = [slice(None)] * 3
     inner[axis] = slice(0, n - 1)
     rate[tuple(inner)] = 1.0 / (path * cell_m)
@@ -112,10 +113,9 @@ def _between(material: Any, axis: int, raster: Raster, conductivity: Floats, res
         high = tuple(at + (k == axis) for k, at in enumerate(low))
         path = cell_m * part / conductivity[material[low]]
         path += cell_m * (1.0 - part) / conductivity[material[high]]
-        if resistance > 0.0:
-            rate[low] = area / ((path * area + resistance) * cell_m)
-        else:
-            rate[low] = 1.0 / (path * cell_m)
+        resists = resistance[material[low], material[high]]
+        area = np.where(resists > 0.0, area, 1.0)
+        rate[low] = area / ((path * area + resists) * cell_m)
     return rate
 
 
@@ -154,5 +154,7 @@ def _difference_steps(
                 if before >= rows[m, 1] > after:
                     share = (before - rows[m, 1]) / (before - after)
                     frozen[x, y, z] = time_s + (step + share) * dt
+                elif after >= rows[m, 1] > before:
+                    frozen[x, y, z] = np.nan
         now, then = then, now
     return now

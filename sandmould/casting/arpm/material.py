@@ -1,4 +1,8 @@
-"""Materials that conduct and solidify, and temperature as a function of enthalpy."""
+"""Materials that conduct and solidify, and temperature as a function of enthalpy.
+
+Properties are numbers or curves over temperature. Elements keep their volume: a density that falls
+with temperature counts as heat that a volume holds, not as metal that leaves it.
+"""
 
 from __future__ import annotations
 
@@ -8,14 +12,59 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
+from scipy.integrate import cumulative_trapezoid
 
 from sandmould.arrays import Floats, Ints
 from sandmould.compiled import njit
 
 
+Curve = float | tuple[tuple[float, float], ...]
+"""A number, or pairs of a temperature (K) or time (s) and a value; linear between two pairs, and as
+in the nearest one beyond them."""
+PROPERTIES = ("density_kg_m3", "heat_capacity_j_kg_k", "conductivity_w_m_k")
+NODES = 1024
+"""Of a table of temperature over enthalpy: a node each two kelvin or so."""
+
+
+def along(curve: Curve, place: Floats) -> Floats:
+    """Values of a curve at temperatures or times, (n,) float64."""
+    if isinstance(curve, tuple):
+        return np.interp(place, *np.transpose(curve))
+    return np.full(len(place), curve, dtype=np.float64)
+
+
+def ends(curve: Curve) -> tuple[float, float]:
+    """Least and largest value of a curve."""
+    values = [value for _, value in curve] if isinstance(curve, tuple) else [curve]
+    return min(values), max(values)
+
+
+def curve_fault(curve: Curve) -> str:
+    """What a curve must be and is not; empty for a good one."""
+    if isinstance(curve, tuple):
+        places = [place for place, _ in curve]
+        if len(curve) < 2 or any(b <= a for a, b in zip(places, places[1:], strict=False)):
+            return "two or more pairs whose first numbers rise"
+    low, high = ends(curve)
+    return "" if 0.0 < low <= high < math.inf else "finite and above 0"
+
+
+def fraction_fault(
+    fraction: Sequence[tuple[float, float]], solidus_k: float, liquidus_k: float
+) -> str:
+    """What a table of solid fractions must be and is not; empty for a good one."""
+    places, values = np.transpose(fraction) if len(fraction) > 1 else np.zeros((2, 2))
+    if (np.diff(places) <= 0.0).any() or not (places[0], places[-1]) == (solidus_k, liquidus_k):
+        span = f"solidus_k {solidus_k:g} to liquidus_k {liquidus_k:g}"
+        return f"pairs whose temperatures rise from {span}"
+    if (np.diff(values) > 0.0).any() or values[0] > 1.0 or values[-1] != 0.0:
+        return "fractions from at most 1 at the solidus that fall, or stay, to 0 at the liquidus"
+    return ""
+
+
 @dataclass(frozen=True)
 class ThermalMaterial:
-    """Constant properties; between solidus and liquidus the latent heat goes linearly.
+    """What conducts heat, and may freeze.
 
     Raises
     ------
@@ -24,19 +73,21 @@ class ThermalMaterial:
     """
 
     name: str
-    density_kg_m3: float
-    heat_capacity_j_kg_k: float
-    conductivity_w_m_k: float
+    density_kg_m3: Curve
+    heat_capacity_j_kg_k: Curve
+    conductivity_w_m_k: Curve
     latent_heat_j_kg: float = 0.0
     solidus_k: float = math.inf
     """Infinite for what does not melt."""
     liquidus_k: float = math.inf
+    solid_fraction: tuple[tuple[float, float], ...] = ()
+    """Temperatures (K) from solidus to liquidus and what is solid at each; what is liquid at the
+    solidus freezes there. Empty for a straight line."""
 
     def __post_init__(self) -> None:
-        for key in ("density_kg_m3", "heat_capacity_j_kg_k", "conductivity_w_m_k"):
-            value = getattr(self, key)
-            if not (value > 0.0 and math.isfinite(value)):
-                raise ValueError(f"{self.name}: {key} is {value}; it must be finite and above 0")
+        for key in PROPERTIES:
+            if fault := curve_fault(getattr(self, key)):
+                raise ValueError(f"{self.name}: {key} is {getattr(self, key)}; it must be {fault}")
         if not (self.latent_heat_j_kg >= 0.0 and math.isfinite(self.latent_heat_j_kg)):
             raise ValueError(
                 f"{self.name}: latent_heat_j_kg is {self.latent_heat_j_kg}; it must be finite and "
@@ -58,9 +109,31 @@ class ThermalMaterial:
         return math.isfinite(self.solidus_k)
 
     @property
+    def is_plain(self) -> bool:
+        """Whether heat is a straight line over temperature but for a straight freezing range."""
+        of_heat = (self.density_kg_m3, self.heat_capacity_j_kg_k)
+        return not (self.solid_fraction or any(isinstance(curve, tuple) for curve in of_heat))
+
+    @property
     def capacity_j_m3_k(self) -> float:
-        """Heat capacity of a volume."""
-        return self.density_kg_m3 * self.heat_capacity_j_kg_k
+        """Least heat capacity of a volume, without latent heat: it limits the steps."""
+        return float(self.capacities_j_m3_k(self.corners_k(0.0, 1.0)).min())
+
+    def capacities_j_m3_k(self, temperature_k: Floats) -> Floats:
+        """Heat capacity of a volume at temperatures, (n,) float64, J/m3/K."""
+        density = along(self.density_kg_m3, temperature_k)
+        return density * along(self.heat_capacity_j_kg_k, temperature_k)
+
+    def corners_k(self, low_k: float, high_k: float) -> Floats:
+        """Two temperatures and all between which properties are not straight, (n,) float64, K."""
+        curves = [getattr(self, key) for key in PROPERTIES] + [self.solid_fraction]
+        bends = [t for curve in curves if isinstance(curve, tuple) for t, _ in curve]
+        return np.unique([low_k, high_k, *bends])
+
+    def solid(self, temperature_k: Floats) -> Floats:
+        """What is solid between solidus and liquidus, (n,) float64."""
+        line = ((self.solidus_k, 1.0), (self.liquidus_k, 0.0))
+        return along(self.solid_fraction or line, temperature_k)
 
 
 @dataclass(frozen=True)
@@ -70,7 +143,9 @@ class EnthalpyTable:
     reference_k: float
     """Where the enthalpy is 0."""
     rows: Floats
-    """(m, 5) float64: J/m3/K; enthalpies of solidus and liquidus, J/m3; solidus and liquidus, K."""
+    """(m, 5) float64: J/m3/K; enthalpies of solidus and liquidus, J/m3; solidus and liquidus, K.
+    Where a material has curves rows go on: enthalpy at the first of the nodes, J/m3; nodes for
+    a J/m3, 0 for a material without curves; temperature at each node, K."""
 
     def enthalpy_j_m3(self, temperature_k: Floats, material: Ints) -> Floats:
         """Enthalpy of elements; one on an isothermal front (solidus = liquidus) is liquid.
@@ -84,7 +159,7 @@ class EnthalpyTable:
         -------
         (n,) float64, J/m3
         """
-        capacity, solid, liquid, solidus, liquidus = self.rows[material].T
+        capacity, solid, liquid, solidus, liquidus = self.rows[material, :5].T
         below = capacity * (temperature_k - self.reference_k)
         melting = np.isfinite(solidus) & (temperature_k >= solidus)
         liquids = np.isfinite(solidus) & (temperature_k >= liquidus)
@@ -92,14 +167,23 @@ class EnthalpyTable:
             share = (temperature_k - solidus) / (liquidus - solidus)
             mushy = solid + share * (liquid - solid)
             above = liquid + capacity * (temperature_k - liquidus)
-        return np.where(liquids, above, np.where(melting, mushy, below))
+        found = np.where(liquids, above, np.where(melting, mushy, below))
+        for m in np.unique(material):
+            if self.rows.shape[1] > 5 and (density := self.rows[m, 6]) > 0.0:
+                heat = self.rows[m, 5] + np.arange(NODES) / density
+                found[material == m] = np.interp(
+                    temperature_k[material == m], self.rows[m, 7:], heat
+                )
+        return found
 
     def temperature_k(self, enthalpy_j_m3: Floats, material: Ints) -> Floats:
         """Temperature of elements, (n,) float64, K; the inverse of ``enthalpy_j_m3``."""
         return np.asarray(_temperatures(enthalpy_j_m3, material, self.rows, self.reference_k))
 
 
-def enthalpy_table(materials: Sequence[ThermalMaterial], reference_k: float) -> EnthalpyTable:
+def enthalpy_table(
+    materials: Sequence[ThermalMaterial], reference_k: float, hottest_k: float = 0.0
+) -> EnthalpyTable:
     """Tabulate materials.
 
     Parameters
@@ -108,20 +192,66 @@ def enthalpy_table(materials: Sequence[ThermalMaterial], reference_k: float) -> 
     reference_k : float, K
         Where the enthalpy is 0: the coldest initial temperature, so that drift is counted against
         the heat that is there to be lost.
+    hottest_k : float, K
+        To where curves are tabulated.
     """
-    rows = []
-    for it in materials:
-        capacity = it.capacity_j_m3_k
-        solid = capacity * (it.solidus_k - reference_k)
-        mushy_k = it.liquidus_k - it.solidus_k if it.melts else 0.0
-        liquid = solid + capacity * mushy_k + it.density_kg_m3 * it.latent_heat_j_kg
-        rows.append((capacity, solid, liquid, it.solidus_k, it.liquidus_k))
-    return EnthalpyTable(reference_k, np.array(rows, dtype=np.float64))
+    plain = all(it.is_plain for it in materials)
+    rows = np.zeros((len(materials), 5 if plain else 7 + NODES))
+    for row, it in zip(rows, materials, strict=True):
+        if it.is_plain:
+            row[:5] = _line(it, reference_k)
+        else:
+            row[:] = _curves(it, reference_k, max(hottest_k, it.liquidus_k if it.melts else 0.0))
+    return EnthalpyTable(reference_k, rows)
+
+
+def _line(it: ThermalMaterial, reference_k: float) -> tuple[float, ...]:
+    capacity = it.capacity_j_m3_k
+    solid = capacity * (it.solidus_k - reference_k)
+    mushy_k = it.liquidus_k - it.solidus_k if it.melts else 0.0
+    density = ends(it.density_kg_m3)[0]
+    liquid = solid + capacity * mushy_k + density * it.latent_heat_j_kg
+    return capacity, solid, liquid, it.solidus_k, it.liquidus_k
+
+
+def _curves(it: ThermalMaterial, reference_k: float, hottest_k: float) -> Floats:
+    """Row of a material with curves."""
+    beyond = 0.1 * max(hottest_k - reference_k, 10.0)
+    low_k, high_k = max(reference_k - beyond, 1.0), hottest_k + beyond
+    place = np.union1d(it.corners_k(low_k, high_k), np.linspace(low_k, high_k, NODES))
+    place = place[(place >= low_k) & (place <= high_k)]
+    solid = np.ones(len(place))
+    if it.melts:
+        # at the solidus twice: what is left freezes there
+        place = np.sort(np.append(place[place != it.solidus_k], [it.solidus_k] * 2))
+        solid = np.where(place > it.solidus_k, it.solid(place), 1.0)
+        solid[np.searchsorted(place, it.solidus_k) + 1] = it.solid(np.array([it.solidus_k]))[0]
+        if it.solidus_k == it.liquidus_k:
+            solid[place > it.solidus_k] = 0.0
+            solid[np.searchsorted(place, it.solidus_k) + 1] = 0.0
+    heat = cumulative_trapezoid(it.capacities_j_m3_k(place), place, initial=0.0)
+    melted_kg_m3 = cumulative_trapezoid(along(it.density_kg_m3, place), 1.0 - solid, initial=0.0)
+    heat += it.latent_heat_j_kg * melted_kg_m3
+    heat -= np.interp(reference_k, place, heat)
+    solidus, liquidus = math.inf, math.inf
+    if it.melts:
+        solidus = heat[np.searchsorted(place, it.solidus_k)]
+        liquidus = heat[np.searchsorted(place, it.liquidus_k, side="right") - 1]
+    least = it.capacities_j_m3_k(place).min()
+    nodes = np.linspace(heat[0], heat[-1], NODES)
+    per_node = (NODES - 1) / (heat[-1] - heat[0])
+    head = [least, solidus, liquidus, it.solidus_k, it.liquidus_k, heat[0], per_node]
+    return np.concatenate([head, np.interp(nodes, heat, place)])
 
 
 @njit(inline="always")
 def temperature_of(enthalpy: float, m: int, rows: Any, reference: float) -> Any:
     """Temperature (K) of an enthalpy (J/m3) of material m; compiled code takes it in."""
+    if rows.shape[1] > 5 and rows[m, 6] > 0.0:
+        place = (enthalpy - rows[m, 5]) * rows[m, 6]
+        node = min(max(int(place), 0), rows.shape[1] - 9)
+        low = rows[m, 7 + node]
+        return low + (place - node) * (rows[m, 8 + node] - low)
     if enthalpy < rows[m, 1]:
         return reference + enthalpy / rows[m, 0]
     if enthalpy < rows[m, 2]:

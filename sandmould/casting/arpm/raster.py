@@ -10,8 +10,8 @@ import numpy as np
 from sandmould.arrays import Flags, Floats, Ints
 from sandmould.scenario.casting.shapes import Body, held_by
 
-MOULD = 0
-"""Material of all that is not painted."""
+MOULD, CASTING = 0, 1
+"""Materials of all that is not painted, and of what is poured; others are inserts and air."""
 
 
 @dataclass(frozen=True)

@@ -18,12 +18,12 @@ from sandmould.casting.arpm.kernel import check_sizes
 from sandmould.casting.arpm.marching import STEP_SHARE
 from sandmould.casting.arpm.material import ThermalMaterial
 from sandmould.casting.arpm.method import HeatMethod
-from sandmould.casting.arpm.raster import Raster, painted
+from sandmould.casting.arpm.raster import CASTING, Raster, painted
 from sandmould.scenario.casting.shapes import Body, Rectangle, solid_of
 from sandmould.scenario.casting.solidification import Solidification
 
 KERNEL_FORMS = ("printed", "corrected", "symmetric")
-CASTING = 1
+
 
 
 def series_columns(scenario: Solidification) -> tuple[str, str, str]:
