@@ -8,6 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
+from itertools import pairwise
 
 import numpy as np
 
@@ -82,7 +83,7 @@ def plane_frozen_s(
     borders = np.flatnonzero(of[1:] != of[:-1])
     frozen, first = np.full(len(of), np.nan), np.full(len(of), np.nan)
     edges = np.concatenate([[0], np.cumsum(count)])
-    parts = [slice(a, b) for a, b in zip(edges[:-1], edges[1:], strict=True)]
+    parts = [slice(a, b) for a, b in pairwise(edges)]
     step_s, path = 0.45 * cell_m**2 / max(least), np.empty(len(of) - 1)
     while time_s < until_s:
         middle = 0.5 * (now[1:] + now[:-1])

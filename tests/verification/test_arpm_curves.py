@@ -4,11 +4,14 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping
+from typing import Any
 
 import numpy as np
 import pytest
 
+from sandmould import SHIPPED
 from sandmould.arrays import Floats
+from sandmould.casting.arpm import scene
 from sandmould.casting.arpm.elements import placed
 from sandmould.casting.arpm.filling import Filling
 from sandmould.casting.arpm.material import ThermalMaterial
@@ -16,7 +19,9 @@ from sandmould.casting.arpm.method import HeatMethod
 from sandmould.casting.arpm.raster import Raster
 from sandmould.casting.arpm.solidification import SolidificationResult, solidify
 from sandmould.casting.arpm.varying import Transfer
-from sandmould.scenario.casting.metals import solid_fractions
+from sandmould.scenario.casting.curves import solid_fractions
+from sandmould.scenario.casting.solidification import Solidification
+from sandmould.scenario.reading import Origin, merge, read_yaml, validated
 from tests.plane_casting import Layer, constant, plane_frozen_s
 
 # Al-4.5Cu: pure aluminium melts at 933 K, the eutectic at 821 K; partition 0.17
@@ -32,12 +37,13 @@ STEEL = ThermalMaterial("steel", 7200.0, 711.0, 29.3, 272e3, 1713.0, 1773.0)
 
 def exact_fraction(law: str, temperature_k: Floats) -> Floats:
     """Closed forms of the three laws."""
+    below = MELTING - temperature_k
     with np.errstate(invalid="ignore", divide="ignore"):
         found = {
             "line": (LIQUIDUS - temperature_k) / (LIQUIDUS - EUTECTIC),
-            "scheil": 1 - ((MELTING - temperature_k) / (MELTING - LIQUIDUS)) ** (1 / (PARTITION - 1)),
+            "scheil": 1 - (below / (MELTING - LIQUIDUS)) ** (1 / (PARTITION - 1)),
             "lever": np.minimum(
-                (LIQUIDUS - temperature_k) / ((MELTING - temperature_k) * (1 - PARTITION)), 1.0),
+                (LIQUIDUS - temperature_k) / (below * (1 - PARTITION)), 1.0),
         }[law]  # fmt: skip
     return np.where(temperature_k >= LIQUIDUS, 0.0, np.where(temperature_k < EUTECTIC, 1.0, found))
 
@@ -126,8 +132,11 @@ def test_a_plate_with_curves_freezes_as_finite_volumes_say(over_time: bool) -> N
 
 
 def test_faces_of_two_sizes_follow_curves_too() -> None:
-    filling = Filling((DIE, ALLOY), (450.0, 960.0),
-                      transfers={(0, 1): Transfer(((EUTECTIC, 3000.0), (LIQUIDUS, 6000.0)))})
+    filling = Filling(
+        (DIE, ALLOY),
+        (450.0, 960.0),
+        transfers={(0, 1): Transfer(((EUTECTIC, 3000.0), (LIQUIDUS, 6000.0)))},
+    )
     found = [frozen(slab((60, 20), (0, 1), 0.0005), filling, 0.5, layers=layers)
              for layers in ((), (4,))]  # fmt: skip
     assert np.abs(found[1].drift_percent).max() < 1e-9
@@ -141,7 +150,9 @@ def test_a_curve_that_is_flat_is_a_number() -> None:
     raster = slab((20, 8, 20), (0, 1, 0), 0.0025)
     as_number = frozen(raster, Filling((SAND, STEEL), (293.0, 1823.0), 1 / 837.0), 10.0)
     as_curve = frozen(raster, Filling((flat, STEEL), (293.0, 1823.0), 1 / 837.0), 10.0)
-    assert as_curve.solidification_time_s == pytest.approx(as_number.solidification_time_s, rel=1e-6)
+    assert as_curve.solidification_time_s == pytest.approx(
+        as_number.solidification_time_s, rel=1e-6
+    )
 
 
 def test_two_moulds_that_are_one() -> None:
@@ -210,3 +221,63 @@ def test_a_skin_that_melts_again_is_not_solid() -> None:
     late = frozen(raster, filling, 0.02, until_s=8.0)
     assert np.isnan(late.heat.frozen_s[metal_only]).all()
     assert math.isnan(late.solidification_time_s)
+
+
+def scenario_of(**changed: Any) -> Solidification:
+    """A plate of steel from edge to edge of its box."""
+    material = read_yaml(SHIPPED / "config/materials/hirata_2019.yaml", "material")
+    tree = merge({}, material, Origin(), "material")
+    box = {"low_m": [0.0, 0.0], "high_m": [0.09, 0.005]}
+    plate = {"kind": "rectangle", "low_m": [0.03, 0.0], "high_m": [0.05, 0.005]}
+    own = {"box": box, "shapes": [plate], "element_m": 0.0025, "record_s": 2.0} | changed
+    return validated(Solidification, merge(tree, own, Origin(), "own"), Origin())
+
+
+def run_of(scenario: Solidification) -> SolidificationResult:
+    raster, filling = scene.drawn_raster(scenario), scene.filling_of(scenario)
+    assert scene.problems(scenario) == []
+    elements = placed(raster, scenario.layers)
+    marching = scene.method_of(scenario).marching(elements, filling, raster)
+    return solidify(elements, filling, marching, record_s=scenario.record_s, until_s=400.0)
+
+
+def test_a_chill_is_a_mould_of_its_own() -> None:
+    sand = {"density_kg_m3": 1600.0, "heat_capacity_j_kg_k": 1130.0, "conductivity_w_m_k": 1.255}
+    shape = {"kind": "rectangle", "low_m": [0.0, 0.0], "high_m": [0.03, 0.005]}
+    plain = run_of(scenario_of())
+    same = run_of(scenario_of(inserts=[sand | {"name": "twin", "shape": shape}]))
+    assert same.solidification_time_s == plain.solidification_time_s
+    iron = {"density_kg_m3": 7200.0, "heat_capacity_j_kg_k": 600.0, "conductivity_w_m_k": 40.0}
+    chilled = run_of(
+        scenario_of(inserts=[iron | {"name": "chill", "shape": shape, "heat_transfer_w_m2_k": 2e3}],
+                    heat_transfer_w_m2_k=400.0, element_m=0.001)
+    )  # fmt: skip
+    # 20 mm of steel between 30 mm of iron and 40 mm of sand
+    assert chilled.solidification_time_s == pytest.approx(exact_between(0.001)[1].max(), rel=5e-3)
+
+
+def test_a_coating_stands_in_series() -> None:
+    coated = run_of(scenario_of(coating_m2k_w=1e-3))
+    as_one = run_of(scenario_of(heat_transfer_w_m2_k=1 / (1 / 837.0 + 1e-3)))
+    assert coated.solidification_time_s == pytest.approx(as_one.solidification_time_s, rel=1e-9)
+
+
+def test_air_cools_a_shell_as_the_lumped_one() -> None:
+    # metal of nearly one temperature behind 5 mm of a shell that holds little heat
+    shell = {"density_kg_m3": 100.0, "heat_capacity_j_kg_k": 100.0, "conductivity_w_m_k": 10.0}
+    metal = {"conductivity_w_m_k": 300.0}
+    box = {"low_m": [0.0, 0.0], "high_m": [0.025, 0.005]}
+    plate = {"kind": "rectangle", "low_m": [0.0, 0.0], "high_m": [0.02, 0.005]}
+    air = {"sides": ["high_x"], "temperature_k": 293.0, "heat_transfer_w_m2_k": 50.0}
+    scenario = scenario_of(box=box, shapes=[plate], mould=shell, casting=metal, air=air,
+                           heat_transfer_w_m2_k=None, element_m=0.005)  # fmt: skip
+    raster, filling = scene.drawn_raster(scenario), scene.filling_of(scenario)
+    elements = placed(raster)
+    marching = scene.method_of(scenario).marching(elements, filling, raster)
+    found = solidify(elements, filling, marching, record_s=20.0, until_s=5000.0)
+    c = 7200.0 * 711.0
+    through = math.log((1773.0 - 293.0) / (1713.0 - 293.0))
+    seconds = math.log((1823.0 - 293.0) / (1773.0 - 293.0)) * c + through * (c + 7200 * 272e3 / 60)
+    resistance = 1 / 50.0 + 0.005 / 10.0
+    # the shell holds 0.2 % of the heat; the metal's gradient is of Bi / 3, 0.1 %
+    assert found.solidification_time_s == pytest.approx(0.02 * resistance * seconds, rel=5e-3)

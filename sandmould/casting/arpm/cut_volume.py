@@ -18,7 +18,7 @@ import numpy as np
 from scipy.ndimage import maximum_filter, minimum_filter
 
 from sandmould.arrays import Flags, Floats, Ints
-from sandmould.casting.arpm.raster import MOULD, Raster, inside_solid
+from sandmould.casting.arpm.raster import CASTING, Raster, inside_solid
 from sandmould.scenario.casting.shapes import Body, Pixels
 
 SAMPLES = {2: 256, 3: 64}
@@ -53,7 +53,7 @@ def held_of(raster: Raster, solids: Sequence[Body]) -> Held:
         Counted at points in each cell beside one of the other material; shares of 0 or 1 and no
         lever in all others.
     """
-    casting = raster.material != MOULD
+    casting = raster.material == CASTING
     near = maximum_filter(casting, 3, mode="nearest") & ~minimum_filter(casting, 3, mode="nearest")
     cells, d, centre = np.flatnonzero(near), casting.ndim, raster.centre_m
     if not any(isinstance(solid, Pixels) for solid in solids):

@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping
 from dataclasses import dataclass, field
+from itertools import combinations
 
 import numpy as np
 
@@ -12,8 +13,9 @@ from sandmould.arrays import Flags, Floats
 from sandmould.casting.arpm.elements import Elements
 from sandmould.casting.arpm.exchange import resistances
 from sandmould.casting.arpm.marching import Heat, Substance
-from sandmould.casting.arpm.material import EnthalpyTable, ThermalMaterial, ends, enthalpy_table
+from sandmould.casting.arpm.material import EnthalpyTable, ThermalMaterial, enthalpy_table
 from sandmould.casting.arpm.varying import Curves, Transfer
+from sandmould.scenario.casting.curves import ends
 
 OUTSIDE = 0.05
 """Of the range of initial temperatures: farther out no stable step leads."""
@@ -69,7 +71,7 @@ class Filling:
         least = self.least_m2k_w
         transfers = {
             (i, j): self.transfers.get((i, j), Transfer(1.0 / least[i, j] if least[i, j] else None))
-            for i, j in zip(*np.triu_indices(len(least), 1), strict=True)
+            for i, j in combinations(range(len(least)), 2)
         }
         low_k, high_k = min(self.initial_k), max(self.initial_k)
         beyond_k = OUTSIDE * (high_k - low_k) + 1.0

@@ -8,58 +8,19 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
-from scipy.integrate import cumulative_trapezoid
 
 from sandmould.arrays import Floats, Ints
 from sandmould.compiled import njit
+from sandmould.scenario.casting.curves import Curve, along, curve_fault, ends
+from sandmould.scenario.casting.solidification import Metal, MouldMaterial
 
-
-Curve = float | tuple[tuple[float, float], ...]
-"""A number, or pairs of a temperature (K) or time (s) and a value; linear between two pairs, and as
-in the nearest one beyond them."""
 PROPERTIES = ("density_kg_m3", "heat_capacity_j_kg_k", "conductivity_w_m_k")
 NODES = 1024
 """Of a table of temperature over enthalpy: a node each two kelvin or so."""
-
-
-def along(curve: Curve, place: Floats) -> Floats:
-    """Values of a curve at temperatures or times, (n,) float64."""
-    if isinstance(curve, tuple):
-        return np.interp(place, *np.transpose(curve))
-    return np.full(len(place), curve, dtype=np.float64)
-
-
-def ends(curve: Curve) -> tuple[float, float]:
-    """Least and largest value of a curve."""
-    values = [value for _, value in curve] if isinstance(curve, tuple) else [curve]
-    return min(values), max(values)
-
-
-def curve_fault(curve: Curve) -> str:
-    """What a curve must be and is not; empty for a good one."""
-    if isinstance(curve, tuple):
-        places = [place for place, _ in curve]
-        if len(curve) < 2 or any(b <= a for a, b in zip(places, places[1:], strict=False)):
-            return "two or more pairs whose first numbers rise"
-    low, high = ends(curve)
-    return "" if 0.0 < low <= high < math.inf else "finite and above 0"
-
-
-def fraction_fault(
-    fraction: Sequence[tuple[float, float]], solidus_k: float, liquidus_k: float
-) -> str:
-    """What a table of solid fractions must be and is not; empty for a good one."""
-    places, values = np.transpose(fraction) if len(fraction) > 1 else np.zeros((2, 2))
-    if (np.diff(places) <= 0.0).any() or not (places[0], places[-1]) == (solidus_k, liquidus_k):
-        span = f"solidus_k {solidus_k:g} to liquidus_k {liquidus_k:g}"
-        return f"pairs whose temperatures rise from {span}"
-    if (np.diff(values) > 0.0).any() or values[0] > 1.0 or values[-1] != 0.0:
-        return "fractions from at most 1 at the solidus that fall, or stay, to 0 at the liquidus"
-    return ""
 
 
 @dataclass(frozen=True)
@@ -87,7 +48,7 @@ class ThermalMaterial:
     def __post_init__(self) -> None:
         for key in PROPERTIES:
             if fault := curve_fault(getattr(self, key)):
-                raise ValueError(f"{self.name}: {key} is {getattr(self, key)}; it must be {fault}")
+                raise ValueError(f"{self.name}: {key} is {getattr(self, key)}; valid is {fault}")
         if not (self.latent_heat_j_kg >= 0.0 and math.isfinite(self.latent_heat_j_kg)):
             raise ValueError(
                 f"{self.name}: latent_heat_j_kg is {self.latent_heat_j_kg}; it must be finite and "
@@ -134,6 +95,19 @@ class ThermalMaterial:
         """What is solid between solidus and liquidus, (n,) float64."""
         line = ((self.solidus_k, 1.0), (self.liquidus_k, 0.0))
         return along(self.solid_fraction or line, temperature_k)
+
+
+def thermal(it: MouldMaterial) -> ThermalMaterial:
+    """A material as the solver takes it."""
+    plain = ThermalMaterial(
+        it.name, it.density_kg_m3, it.heat_capacity_j_kg_k, it.conductivity_w_m_k
+    )
+    if not isinstance(it, Metal):
+        return plain
+    return replace(
+        plain, latent_heat_j_kg=it.latent_heat_j_kg, solidus_k=it.solidus_k,
+        liquidus_k=it.liquidus_k, solid_fraction=it.solid,
+    )  # fmt: skip
 
 
 @dataclass(frozen=True)
@@ -214,6 +188,12 @@ def _line(it: ThermalMaterial, reference_k: float) -> tuple[float, ...]:
     return capacity, solid, liquid, it.solidus_k, it.liquidus_k
 
 
+def _integral(values: Floats, over: Floats) -> Floats:
+    """Integral from the first of some places to each, of straight lines between them."""
+    parts = 0.5 * (values[1:] + values[:-1]) * np.diff(over)
+    return np.concatenate([[0.0], np.cumsum(parts)])
+
+
 def _curves(it: ThermalMaterial, reference_k: float, hottest_k: float) -> Floats:
     """Row of a material with curves."""
     beyond = 0.1 * max(hottest_k - reference_k, 10.0)
@@ -229,8 +209,8 @@ def _curves(it: ThermalMaterial, reference_k: float, hottest_k: float) -> Floats
         if it.solidus_k == it.liquidus_k:
             solid[place > it.solidus_k] = 0.0
             solid[np.searchsorted(place, it.solidus_k) + 1] = 0.0
-    heat = cumulative_trapezoid(it.capacities_j_m3_k(place), place, initial=0.0)
-    melted_kg_m3 = cumulative_trapezoid(along(it.density_kg_m3, place), 1.0 - solid, initial=0.0)
+    heat = _integral(it.capacities_j_m3_k(place), place)
+    melted_kg_m3 = _integral(along(it.density_kg_m3, place), 1.0 - solid)
     heat += it.latent_heat_j_kg * melted_kg_m3
     heat -= np.interp(reference_k, place, heat)
     solidus, liquidus = math.inf, math.inf

@@ -11,8 +11,9 @@ from numba import prange
 from scipy.sparse import csr_array
 
 from sandmould.arrays import Floats, Ints
-from sandmould.casting.arpm.material import Curve, ThermalMaterial, along, ends
+from sandmould.casting.arpm.material import ThermalMaterial
 from sandmould.compiled import njit
+from sandmould.scenario.casting.curves import Curve, along, ends
 
 PLACES = 1024
 """Temperatures of a table."""
