@@ -19,6 +19,7 @@ import numpy as np
 from scipy.spatial import cKDTree
 
 from sandmould.arrays import Flags, Floats, Ints
+from sandmould.casting.arpm.cut_links import passage_of
 from sandmould.casting.arpm.cut_volume import held_of, inside_any, volumes
 from sandmould.casting.arpm.drawn_surface import Pieces, pieces_of
 from sandmould.casting.arpm.raster import CASTING, Cut, Raster
@@ -66,7 +67,9 @@ def with_cut(raster: Raster, solids: Sequence[Body]) -> Raster:
     cell = np.flatnonzero(volume != 1.0)
     if not len(cell) and plain.all():
         return raster
-    return replace(raster, cut=Cut(cell, volume[cell], faces.low, faces.axis, area, low_part))
+    passage = passage_of(raster, solids, held)
+    cut = Cut(cell, volume[cell], faces.low, faces.axis, area, low_part, passage)
+    return replace(raster, cut=cut)
 
 
 def _faces(casting: Flags) -> _Faces:

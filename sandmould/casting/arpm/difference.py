@@ -12,12 +12,13 @@ from typing import Any, NamedTuple
 
 import numpy as np
 from numba import prange, set_num_threads
+from scipy.sparse import coo_array, csr_array
 
 from sandmould.arrays import Floats
 from sandmould.casting.arpm.exchange import resistances
 from sandmould.casting.arpm.marching import STEP_SHARE, Heat
 from sandmould.casting.arpm.material import EnthalpyTable, temperature_of
-from sandmould.casting.arpm.raster import Raster
+from sandmould.casting.arpm.raster import Passage, Raster
 from sandmould.compiled import njit
 
 
@@ -32,6 +33,10 @@ class HeatGrid(NamedTuple):
     """(nx, ny, nz) int64."""
     thinner: Any
     """(nx, ny, nz) float64: a cell's volume over what it holds; (0, 0, 0) where all hold it."""
+    link_start: Any
+    link_cell: Any
+    link_rate: Floats
+    """Cells that heat joins past a drawn surface, by the cell, and their rates, W/m3/K."""
     rows: Floats
     reference: float
     """See ``EnthalpyTable``."""
@@ -72,14 +77,15 @@ class DifferenceSteps:
         for axis, along in enumerate((along_x, along_y, along_z)):
             rate += along + np.roll(along, 1, axis=axis)
         self.volume_m3 = np.full(material.size, raster.cell_m**raster.material.ndim)
-        thinner = np.zeros((0, 0, 0))
+        thinner, links = np.zeros((0, 0, 0)), csr_array((0, 0))
         if raster.cut:
             self.volume_m3[raster.cut.cell] *= raster.cut.volume_share
             thinner = np.ones(shape)
             thinner.reshape(-1)[raster.cut.cell] = 1.0 / raster.cut.volume_share
-            rate *= thinner
-        self._grid = HeatGrid(along_x, along_y, along_z, material, thinner, table.rows,
-                              table.reference_k)  # fmt: skip
+            links = _links(raster, raster.cut.passage, conductivity_w_m_k)
+            rate = (rate + links.sum(axis=1).reshape(shape)) * thinner
+        self._grid = HeatGrid(along_x, along_y, along_z, material, thinner, links.indptr,
+                              links.indices, links.data, table.rows, table.reference_k)  # fmt: skip
         self.step_s = share * float((table.rows[material, 0] / rate).min())
         self._threads = threads
 
@@ -116,7 +122,19 @@ def _between(material: Any, axis: int, raster: Raster, conductivity: Floats, res
         resists = resistance[material[low], material[high]]
         area = np.where(resists > 0.0, area, 1.0)
         rate[low] = area / ((path * area + resists) * cell_m)
+        passage = raster.cut.passage
+        within = passage.axis == axis - (3 - raster.material.ndim)
+        rate[np.unravel_index(passage.low[within], material.shape)] *= passage.share[within]
     return rate
+
+
+def _links(raster: Raster, passage: Passage, conductivity: Floats) -> csr_array:
+    """Rates between cells that heat joins past a surface, as of ``_between``."""
+    first, second = passage.link
+    k = conductivity[raster.material.reshape(-1)[first]]
+    rate = np.tile(k * passage.link_share / raster.cell_m**2, 2)
+    pair = np.concatenate([first, second]), np.concatenate([second, first])
+    return coo_array((rate, pair), (raster.material.size,) * 2).tocsr()
 
 
 @njit(parallel=True)
@@ -125,7 +143,7 @@ def _difference_steps(
     frozen: Any,
 ) -> Any:  # fmt: skip
     """Take explicit steps; enthalpy and freezing times change in place, temperatures come back."""
-    through_x, through_y, through_z, material, thinner, rows, reference = grid
+    through_x, through_y, through_z, material, thinner, start, cell, along, rows, reference = grid
     nx, ny, nz = enthalpy.shape
     now, then = temperature.copy(), np.empty_like(temperature)
     for step in range(steps):
@@ -146,6 +164,9 @@ def _difference_steps(
                 if z < nz - 1:
                     taken += through_z[x, y, z] * (now[x, y, z + 1] - own)
                 if thinner.size:
+                    for k in range(start[line * nz + z], start[line * nz + z + 1]):
+                        at = cell[k]
+                        taken += along[k] * (now[at // nz // ny, at // nz % ny, at % nz] - own)
                     taken *= thinner[x, y, z]
                 before, m = enthalpy[x, y, z], material[x, y, z]
                 after = before + dt * taken

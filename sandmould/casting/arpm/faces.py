@@ -34,7 +34,8 @@ class Faces:
     area_m2: Floats
     """(f,) float64, m2, or m in 2D: of the grid."""
     drawn_share: Floats
-    """(f,) float64: the drawn surface's area over ``area_m2``; 1 within a material."""
+    """(f,) float64: the drawn surface's area over ``area_m2``; within a material what of the face
+    lies in it."""
     first_part: Floats
     """(f,) float64: of the line between the cells' centres on both sides, that in the first's
     material."""
@@ -97,14 +98,18 @@ def faces_of(elements: Elements) -> Faces:
 def _drawn(cut: Cut, shape: tuple[int, ...], axis: int, apart: Flags, of: Ints, count: Ints
            ) -> tuple[Floats, Floats]:  # fmt: skip
     """Means of the surface's share and the path's part over the cells' faces of each pair."""
-    own = cut.axis == axis
-    at = np.unravel_index(cut.low[own], shape)
+    own, within = cut.axis == axis, cut.passage.axis == axis
     inner = tuple(k - (i == axis) for i, k in enumerate(shape))
-    place = np.ravel_multi_index(at, inner)
+    place, open_place = (
+        np.ravel_multi_index(np.unravel_index(low, shape), inner)
+        for low in (cut.low[own], cut.passage.low[within])
+    )
     means = []
     for values, plain in ((cut.area_share[own], 1.0), (cut.low_part[own], 0.5)):
         all_faces = np.full(len(apart), plain)
         all_faces[place] = values
+        if plain == 1.0:
+            all_faces[open_place] = cut.passage.share[within]
         means.append(np.bincount(of, all_faces[apart], len(count)) / count)
     return means[0], means[1]
 
@@ -138,14 +143,25 @@ def face_exchange(
     off = (faces.first_part - 0.5) * elements.grid_m
     first, second = faces.first, faces.second
     length = np.stack([half[first] + off, half[second] - off])
+    area, share = faces.area_m2, faces.drawn_share
+    if elements.cut:
+        k, other, through = _links(elements)
+        first, second = np.concatenate([first, k]), np.concatenate([second, other])
+        length = np.hstack([length, 0.5 * elements.grid_m * np.ones((2, len(k)))])
+        area = np.concatenate([area, through])
+        share = np.concatenate([share, np.ones(len(k))])
     resists = between[material[first], material[second]]
-    share = np.where(resists > 0.0, faces.drawn_share, 1.0)
+    within = material[first] == material[second]
+    area = area * np.where(within, share, 1.0)
+    share = np.where(~within & (resists > 0.0), share, 1.0)
     path = length[0] / conductivity_w_m_k[material[first]]
     path += length[1] / conductivity_w_m_k[material[second]]
-    conductance = faces.area_m2 * share / (path * share + resists)
+    conductance = area * share / (path * share + resists)
+    met = MetFaces(first, second, length, area, share, np.empty(0, dtype=np.int64), material)
     into: csr_array = eye_array(len(first), format="csr")
     if consistent:
-        k, other, added, sum_of = _shared(elements, faces, conductance)
+        k, other, added, sum_of = _shared(elements, faces, conductance[: len(faces.first)])
+        sum_of.resize((len(k), len(first)))
         first, second = np.concatenate([first, k]), np.concatenate([second, other])
         conductance = np.concatenate([conductance, added])
         into = vstack([into, sum_of], format="csr")
@@ -155,8 +171,7 @@ def face_exchange(
     number = np.full(between.shape, -1)
     for place, pair in enumerate(curves.transfers):
         number[pair] = number[pair[::-1]] = place
-    met = MetFaces(faces.first, faces.second, length, faces.area_m2, share,
-                   number[material[faces.first], material[faces.second]], material)  # fmt: skip
+    met = met._replace(transfer=number[material[met.first], material[met.second]])
     into = _into_rates(exchange, first, second) @ into
     return replace(exchange, varying=varying_faces(met, into, curves))
 
@@ -169,6 +184,16 @@ def _into_rates(exchange: Exchange, first: Ints, second: Ints) -> csr_array:
     entry = np.searchsorted(own, row * n + column)
     pair = np.tile(np.arange(len(first)), 2)
     return coo_array((1.0 / exchange.volume_m3[row], (entry, pair)), (len(own), len(first))).tocsr()
+
+
+def _links(elements: Elements) -> tuple[Ints, Ints, Floats]:
+    """Elements that heat joins past the surface, and the area (m2) that it has for that."""
+    assert elements.cut is not None
+    owner, passage = owners(elements).reshape(-1), elements.cut.passage
+    first, second = owner[passage.link]
+    apart = first != second
+    area = passage.link_share[apart] * elements.grid_m ** (elements.dimensions - 1)
+    return first[apart], second[apart], area
 
 
 def over_faces(first: Ints, second: Ints, conductance_w_k: Floats, volume_m3: Floats) -> Exchange:

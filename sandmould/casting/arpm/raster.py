@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
 
@@ -12,6 +13,20 @@ from sandmould.scenario.casting.shapes import Body, held_by
 
 MOULD, CASTING = 0, 1
 """Materials of all that is not painted, and of what is poured; others are inserts and air."""
+
+
+class Passage(NamedTuple):
+    """What passes heat beside a surface other than whole faces."""
+
+    low: Ints
+    """(f,) int64: cells on the low side of faces within a material."""
+    axis: Ints
+    share: Floats
+    """(f,) float64: of each face that lies in the material."""
+    link: Ints
+    """(2, l) int64: cells of a material that do not touch in it."""
+    link_share: Floats
+    """(l,) float64: over what a whole face between two cells passes."""
 
 
 @dataclass(frozen=True)
@@ -30,6 +45,8 @@ class Cut:
     """(f,) float64: the drawn surface's area there over a full face's."""
     low_part: Floats
     """(f,) float64: of the line between the two centres, what lies in the low cell's material."""
+    passage: Passage
+    """How heat passes along the surface."""
 
 
 @dataclass(frozen=True)
