@@ -17,7 +17,7 @@ from scipy.sparse import coo_array, csr_array, diags_array, triu
 
 from sandmould.arrays import Flags, Floats, Ints
 from sandmould.casting.arpm.cut_volume import CHUNK, Held, inside_any
-from sandmould.casting.arpm.raster import CASTING, Passage, Raster
+from sandmould.casting.arpm.raster import CASTING, BesideFaces, Raster
 from sandmould.scenario.casting.shapes import Body
 
 ALONG = {2: 64, 3: 6}
@@ -28,7 +28,7 @@ LEAST = 1e-3
 """Of a whole face: weaker links are left out."""
 
 
-def passage_of(raster: Raster, solids: Sequence[Body], held: Held) -> Passage:
+def passage_of(raster: Raster, solids: Sequence[Body], held: Held) -> BesideFaces:
     """Faces that a surface cuts within a material, and links past it.
 
     Parameters
@@ -46,7 +46,7 @@ def passage_of(raster: Raster, solids: Sequence[Body], held: Held) -> Passage:
     within = casting[low] == casting[high]
     own = np.where(casting[low], share, 1.0 - share)
     link = np.concatenate([pair for pair, _ in found], axis=1)
-    return Passage(
+    return BesideFaces(
         low[within], axis[within], own[within], link, np.concatenate([of for _, of in found])
     )
 

@@ -18,7 +18,7 @@ from sandmould.arrays import Floats
 from sandmould.casting.arpm.exchange import resistances
 from sandmould.casting.arpm.marching import STEP_SHARE, Heat
 from sandmould.casting.arpm.material import EnthalpyTable, temperature_of
-from sandmould.casting.arpm.raster import Passage, Raster
+from sandmould.casting.arpm.raster import BesideFaces, Raster
 from sandmould.compiled import njit
 
 
@@ -128,7 +128,7 @@ def _between(material: Any, axis: int, raster: Raster, conductivity: Floats, res
     return rate
 
 
-def _links(raster: Raster, passage: Passage, conductivity: Floats) -> csr_array:
+def _links(raster: Raster, passage: BesideFaces, conductivity: Floats) -> csr_array:
     """Rates between cells that heat joins past a surface, as of ``_between``."""
     first, second = passage.link
     k = conductivity[raster.material.reshape(-1)[first]]

@@ -132,11 +132,11 @@ def heat_to_lose_j_m3(scenario: Solidification) -> float:
 def mould_of(scenario: Solidification) -> tuple[float, float]:
     """Conductivity (W/m/K) and heat capacity (J/m3/K) of the mould as it warms to the solidus."""
     low_k, high_k = scenario.initial_k.mould, scenario.casting.solidus_k
+    it = thermal(scenario.mould)
     k, density, heat = (
         typical(curve, low_k, high_k)
-        for curve in (scenario.mould.conductivity_w_m_k, scenario.mould.density_kg_m3,
-                      scenario.mould.heat_capacity_j_kg_k)
-    )  # fmt: skip
+        for curve in (it.conductivity_w_m_k, it.density_kg_m3, it.heat_capacity_j_kg_k)
+    )
     return k, density * heat
 
 

@@ -160,8 +160,7 @@ def face_exchange(
     met = MetFaces(first, second, length, area, share, np.empty(0, dtype=np.int64), material)
     into: csr_array = eye_array(len(first), format="csr")
     if consistent:
-        k, other, added, sum_of = _shared(elements, faces, conductance[: len(faces.first)])
-        sum_of.resize((len(k), len(first)))
+        k, other, added, sum_of = _shared(elements, faces, conductance)
         first, second = np.concatenate([first, k]), np.concatenate([second, other])
         conductance = np.concatenate([conductance, added])
         into = vstack([into, sum_of], format="csr")

@@ -15,7 +15,14 @@ import numpy as np
 
 from sandmould.arrays import Floats, Ints
 from sandmould.compiled import njit
-from sandmould.scenario.casting.curves import Curve, along, curve_fault, ends
+from sandmould.scenario.casting.curves import (
+    QUARTZ_KG_M3,
+    Curve,
+    along,
+    curve_fault,
+    ends,
+    packed_w_m_k,
+)
 from sandmould.scenario.casting.solidification import Metal, MouldMaterial
 
 PROPERTIES = ("density_kg_m3", "heat_capacity_j_kg_k", "conductivity_w_m_k")
@@ -99,9 +106,10 @@ class ThermalMaterial:
 
 def thermal(it: MouldMaterial) -> ThermalMaterial:
     """A material as the solver takes it."""
-    plain = ThermalMaterial(
-        it.name, it.density_kg_m3, it.heat_capacity_j_kg_k, it.conductivity_w_m_k
-    )
+    density, conductivity = it.density_kg_m3, it.conductivity_w_m_k
+    if it.packing is not None:
+        density, conductivity = it.packing * QUARTZ_KG_M3, packed_w_m_k(it.packing)
+    plain = ThermalMaterial(it.name, density, it.heat_capacity_j_kg_k, conductivity)
     if not isinstance(it, Metal):
         return plain
     return replace(

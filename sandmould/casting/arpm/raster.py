@@ -15,7 +15,7 @@ MOULD, CASTING = 0, 1
 """Materials of all that is not painted, and of what is poured; others are inserts and air."""
 
 
-class Passage(NamedTuple):
+class BesideFaces(NamedTuple):
     """What passes heat beside a surface other than whole faces."""
 
     low: Ints
@@ -45,7 +45,7 @@ class Cut:
     """(f,) float64: the drawn surface's area there over a full face's."""
     low_part: Floats
     """(f,) float64: of the line between the two centres, what lies in the low cell's material."""
-    passage: Passage
+    passage: BesideFaces
     """How heat passes along the surface."""
 
 

@@ -180,11 +180,11 @@ def _misfits(scenario: Solidification) -> Iterator[Problem]:
     if scenario.exchange == "difference" and scenario.layers:
         valid = "empty with exchange difference: its cells have one size"
         yield Problem("layers", list(scenario.layers), valid)
-    it = scenario
-    if it.exchange != "faces" and filling_of(it).curves is not None:
+    filling, exchange = filling_of(scenario), scenario.exchange
+    if exchange != "faces" and filling.curves is not None:
         valid = "faces, where a conductivity or heat transfer has a curve"
-        yield Problem("exchange", it.exchange, valid)
-    elif it.exchange in KERNEL_FORMS and filling_of(it).least_m2k_w.any():
+        yield Problem("exchange", exchange, valid)
+    elif exchange in KERNEL_FORMS and filling.least_m2k_w.any():
         valid = (
             "faces or difference where heat_transfer_w_m2_k resists the heat: kernels do not see "
             "the surface on which it acts"

@@ -13,6 +13,10 @@ from sandmould.arrays import Floats
 Curve = float | tuple[tuple[float, float], ...]
 """A number, or pairs of a temperature (K) or time (s) and a value; linear between two pairs, and as
 in the nearest one beyond them."""
+QUARTZ_KG_M3 = 2650.0
+QUARTZ_W_M_K = ((300.0, 7.7), (800.0, 3.2), (1300.0, 2.2))
+AIR_W_M_K = ((300.0, 0.0263), (800.0, 0.0573), (1300.0, 0.0837))
+"""But for air at 300 K from memory: their sources were not seen."""
 POINTS = 400
 """Of a law between solidus and liquidus."""
 
@@ -88,3 +92,29 @@ def solid_fractions(
     solid = np.clip(solid, 0.0, 1.0)
     solid[-1] = 0.0
     return tuple(zip(at.tolist(), solid.tolist(), strict=True))
+
+
+def packed_w_m_k(solid_fraction: float) -> Curve:
+    """Conductivity of dry quartz sand over temperature, without radiation between its grains.
+
+    Zehner and Schluender, Chemie Ingenieur Technik 42 (1970) 933-941: round grains, in whose unit
+    cell heat passes grain and gas in parallel.
+
+    Parameters
+    ----------
+    solid_fraction : float
+    """
+    at = np.linspace(300.0, 1300.0, 41)
+    gas = along(AIR_W_M_K, at)
+    found = gas * packed_over_gas(gas / along(QUARTZ_W_M_K, at), solid_fraction)
+    return tuple(zip(at.tolist(), found.tolist(), strict=True))
+
+
+def packed_over_gas(gas_over_grain: Floats, solid_fraction: float) -> Floats:
+    """Conductivity of a packing over that of its gas, by that of the gas over that of a grain."""
+    n, form = gas_over_grain, 1.25 * (solid_fraction / (1.0 - solid_fraction)) ** (10.0 / 9.0)
+    rest = 1.0 - n * form
+    cell = (1.0 - n) * form / rest**2 * np.log(1.0 / (n * form))
+    cell += -0.5 * (form + 1.0) - (form - 1.0) / rest
+    root = math.sqrt(solid_fraction)
+    return np.asarray(1.0 - root + 2.0 * root / rest * cell)

@@ -31,6 +31,14 @@ class MouldMaterial(Section):
     heat_capacity_j_kg_k: Curve = quantity(..., f"Heat.{OVER_K}", unit="J/kg/K", source="user")
     conductivity_w_m_k: Curve = quantity(..., f"Conductivity.{OVER_K}", unit="W/m/K", source="user")
 
+    packing: float | None = quantity(
+        None,
+        "Solid fraction of dry quartz sand, as a study of sand finds it: density and conductivity "
+        "are then those of the packing (Zehner and Schluender 1970), not the stated ones.",
+        source="user",
+        gt=0.4,
+        lt=0.8,
+    )
     _curves = field_validator("density_kg_m3", "heat_capacity_j_kg_k", "conductivity_w_m_k")(
         _checked
     )
@@ -131,7 +139,7 @@ class MetalAndMould(Section):
         "Resistance of a coating between casting and mould, its thickness over its conductivity: "
         "in series with the heat transfer.",
         unit="m2 K/W",
-        source=ARGUED,
+        source="user",
         ge=0,
     )
 
