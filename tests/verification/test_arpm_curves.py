@@ -16,9 +16,10 @@ from sandmould.casting.arpm.elements import placed
 from sandmould.casting.arpm.filling import Filling
 from sandmould.casting.arpm.material import ThermalMaterial
 from sandmould.casting.arpm.method import HeatMethod
-from sandmould.casting.arpm.raster import Raster
+from sandmould.casting.arpm.raster import Raster, painted
 from sandmould.casting.arpm.solidification import SolidificationResult, solidify
 from sandmould.casting.arpm.varying import Transfer
+from sandmould.geometry.geometry import Block
 from sandmould.scenario.casting.curves import packed_over_gas, packed_w_m_k, solid_fractions
 from sandmould.scenario.casting.solidification import Solidification
 from sandmould.scenario.reading import Origin, merge, read_yaml, validated
@@ -337,3 +338,26 @@ def test_dry_sand_conducts_by_its_packing() -> None:
     # it goes as 1 / (k rho c): 24 % of that between the two, here beside a resistance
     ratio = [float(np.mean([v for _, v in packed_w_m_k(s)])) * s for s in (0.58, 0.62)]  # type: ignore[union-attr]
     assert 1.05 < loose / dense < 1.02 * ratio[1] / ratio[0]
+
+
+@pytest.mark.parametrize(
+    ("way", "stepping", "layers", "seconds"),
+    [
+        ("faces", "local", (), 155.02382713624965),
+        ("faces", "local", (2,), 156.14961175321955),
+        ("faces", "super", (2,), 157.09592678331617),
+        ("faces", "explicit", (), 155.262003995689),
+        ("difference", "local", (), 155.262003995689),
+        ("corrected", "local", (), 152.79143894743467),
+    ],
+)
+def test_numbers_for_curves_give_the_digits_of_before(
+    way: Any, stepping: Any, layers: tuple[int, ...], seconds: float
+) -> None:
+    # computed before there were curves; to the round-off of another machine
+    body = Block("bar", np.zeros(2), np.full(2, 0.02), np.eye(2))
+    raster = painted(np.full(2, -0.05), np.full(2, 0.05), 0.0025, {1: body})
+    elements, filling = placed(raster, layers), Filling((SAND, STEEL), (293.0, 1823.0), 1 / 837.0)
+    marching = HeatMethod(way, stepping).marching(elements, filling, raster)
+    found = solidify(elements, filling, marching, record_s=10.0, until_s=200.0)
+    assert found.solidification_time_s == pytest.approx(seconds, rel=1e-12)

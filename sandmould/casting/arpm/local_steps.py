@@ -23,9 +23,9 @@ from sandmould.casting.arpm.varying import VaryingFaces
 from sandmould.compiled import njit
 
 MOST_LEVELS = 8
-FOLLOWED = 256
-"""Shortest steps after which conductances that vary are found anew, or the longest step if that is
-more."""
+LOOKED_AT, CHANGED_K = 64, 5.0
+"""Shortest steps after which it is looked whether conductances that vary are to be found anew, and
+the change of a temperature from which they are."""
 
 
 class Levels(NamedTuple):
@@ -114,12 +114,15 @@ class LocalSteps:
         )
         set_num_threads(self._threads)
         dt = duration_s / (cycles * substeps)
-        some = cycles if self._varying is None else max(1, FOLLOWED // substeps)
-        for begin in range(0, cycles, some):
-            end_of = min(begin + some, cycles)
-            if self._varying is not None:
+        some, last_k = max(1, LOOKED_AT // substeps), np.full(len(temperature), np.nan)
+        for begin in range(0, cycles, cycles if self._varying is None else some):
+            end_of = cycles if self._varying is None else min(begin + some, cycles)
+            if self._varying is not None and (
+                self._varying.over_time or not np.abs(temperature - last_k).max() < CHANGED_K
+            ):
                 middle_s = heat.time_s + 0.5 * (begin + end_of) * substeps * dt
                 self._system.rate[:] = self._varying.rates_w_m3_k(temperature, middle_s)
+                last_k = temperature.copy()
             _local_steps(
                 begin * substeps, end_of * substeps, dt, heat.time_s, levels, self._system,
                 enthalpy, temperature, frozen,

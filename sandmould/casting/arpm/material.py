@@ -237,7 +237,7 @@ def temperature_of(enthalpy: float, m: int, rows: Any, reference: float) -> Any:
     """Temperature (K) of an enthalpy (J/m3) of material m; compiled code takes it in."""
     if rows.shape[1] > 5 and rows[m, 6] > 0.0:
         place = (enthalpy - rows[m, 5]) * rows[m, 6]
-        node = min(max(int(place), 0), rows.shape[1] - 9)
+        node = int(min(max(place, 0.0), rows.shape[1] - 9.0))
         low = rows[m, 7 + node]
         return low + (place - node) * (rows[m, 8 + node] - low)
     if enthalpy < rows[m, 1]:

@@ -87,6 +87,11 @@ class VaryingFaces:
     conductivity_w_m_k: Floats
     """(m, PLACES) float64."""
 
+    @property
+    def over_time(self) -> bool:
+        """Whether something changes with time alone."""
+        return any(it.over_time and it.varies for it in self.curves.transfers.values())
+
     def sorted(self, back: Ints, material: Ints, entry: Ints) -> VaryingFaces:
         """The same for elements in another order.
 
