@@ -20,7 +20,7 @@ from sandmould.plain_file import read_plain
 from sandmould.scenario.moved_keys import called, holds_anyway, instead_of
 from sandmould.scenario.quantity import units_at
 from sandmould.scenario.standing_keys import standing_keys, standing_kinds, standing_lengths
-from sandmould.scenario.units import number_of
+from sandmould.scenario.units import in_kelvin, number_of
 from sandmould.scenario.yaml_text import fault_of, load_planned, load_users
 
 Tree = dict[str, Any]
@@ -153,7 +153,7 @@ def _unwrap(value: Any, origin: Origin, file: str, key: str) -> Any:
     origin.file[key] = file
     if _is_sourced(value):
         origin.source[key] = str(value["source"])
-        return value["value"]
+        return in_kelvin(value["value"], str(value.get("unit", "")))
     if isinstance(value, dict):
         return {n: _unwrap(v, origin, file, f"{key}.{n}") for n, v in value.items()}
     if isinstance(value, list):

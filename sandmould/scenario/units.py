@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import re
 from collections.abc import Iterable
+from typing import Any
 
 FACTORS = {
     "m": {"m": 1.0, "mm": 1e-3, "cm": 1e-2, "dm": 0.1, "km": 1e3, "um": 1e-6, "nm": 1e-9},
@@ -22,6 +23,12 @@ FACTORS = {
     "deg": {"deg": 1.0, "degrees": 1.0, "°": 1.0, "rad": 57.29577951308232},
 }
 """Factor of each unit to that of the key, by the unit of the key."""
+CELSIUS = "degC"
+"""Taken where a key states kelvin."""
+OVER_CELSIUS = f" over {CELSIUS}"
+"""After the unit of a curve's values where its temperatures are in degrees C."""
+_ZERO_K = 273.15
+_DEGREES = ("C", "degC", "deg C", "°C", "celsius")
 _NUMBER = re.compile(r"\s*([-+]?(?:\d+[.,]?\d*|[.,]\d+)(?:[eE][-+]?\d+)?)\s*(\S.*?)\s*$")
 _SPELT = str.maketrans({"µ": "u", "μ": "u", "²": "2", "³": "3", "^": None, "*": None, "·": " "})
 
@@ -46,4 +53,21 @@ def number_of(text: str, units: Iterable[str]) -> str:
     found = _NUMBER.match(text)
     if not found:
         return ""
-    return in_unit(float(found[1].replace(",", ".")), found[2], units)
+    value = float(found[1].replace(",", "."))
+    if "K" in units and found[2] in _DEGREES:
+        return f"write {{value: {value:g}, unit: {CELSIUS}, source: ...}}"
+    return in_unit(value, found[2], units)
+
+
+def unit_of(unit: str) -> str:
+    """The unit that a key must have for a value to be taken in another one."""
+    return "K" if unit == CELSIUS else unit.removesuffix(OVER_CELSIUS)
+
+
+def in_kelvin(value: Any, unit: str) -> Any:
+    """A value as it counts: degrees C as kelvin, in a number or in the pairs of a curve."""
+    if unit.endswith(OVER_CELSIUS):
+        return [[round(place + _ZERO_K, 9), of] for place, of in value]
+    if unit == CELSIUS and isinstance(value, int | float):
+        return round(value + _ZERO_K, 9)
+    return value

@@ -14,6 +14,7 @@ from sandmould.arrays import Floats
 from sandmould.casting.arpm.cut import with_cut
 from sandmould.casting.arpm.cut_volume import LEAST_SHARE, held_of
 from sandmould.casting.arpm.elements import placed
+from sandmould.casting.arpm.faces import face_exchange
 from sandmould.casting.arpm.filling import Filling
 from sandmould.casting.arpm.front import middle_frozen_s
 from sandmould.casting.arpm.material import ThermalMaterial
@@ -169,7 +170,7 @@ def test_a_disc_freezes_as_the_radial_solution(
 ) -> None:
     for shift in SHIFTS:
         found = frozen(disc_on(8, shift), case, way, layers)
-        # 0.57 % measured in sand, 0.86 % with layers, 0.1 % in a die; -3.5 and -15 % with a
+        # 0.18 % measured in sand, 0.08 % in a die; -3.5 and -15 % with a
         # staircase's area
         assert found.solidification_time_s == pytest.approx(exact(case, 2), rel=0.01)
         assert np.abs(found.drift_percent).max() < 1e-10
@@ -189,8 +190,8 @@ def test_a_disc_converges(case: str) -> None:
 def test_where_the_surface_lies_between_middles_counts_little(cells: float) -> None:
     found = [frozen(drawn([turned(0.0)], cells, shift), "steel in sand").solidification_time_s
              for shift in SHIFTS]  # fmt: skip
-    # 0.2 % measured; 0.5 % at 8 where what a cell holds counts at its middle
-    assert np.ptp(found) / found[0] < 0.003
+    # 0.36 % measured; 0.5 % at 8 where what a cell holds counts at its middle
+    assert np.ptp(found) / found[0] < 0.004
 
 
 @pytest.mark.parametrize("degrees", [0.0, 20.0, 45.0])
@@ -216,7 +217,7 @@ def test_a_turned_bar_freezes_as_the_bar_upright(case: str, way: str) -> None:
     for degrees in (45.0, 20.0, 7.0):
         for shift in SHIFTS:
             found = frozen(turned_on(degrees, shift), case, way)
-            # 0.60 % measured at 45 degrees in sand, 0.31 % in a die
+            # 0.68 % measured at 20 degrees in sand
             assert found.solidification_time_s == pytest.approx(expected, rel=0.01)
 
 
@@ -229,7 +230,7 @@ def test_a_ball_freezes_as_the_radial_solution(case: str, cells: int) -> None:
         assert volume_of(raster) == pytest.approx(4 / 3 * math.pi * R**3, rel=2e-3)
         assert area_of(raster) == pytest.approx(4 * math.pi * R**2, rel=2e-3)
         found = frozen(raster, case, way, layers)
-        # 0.77 % measured in sand, 0.41 % in a die; -12 and -30 % with a staircase's area
+        # 0.35 % measured in sand, 0.09 % in a die; -12 and -30 % with a staircase's area
         assert found.solidification_time_s == pytest.approx(exact(case, 3), rel=0.01)
         assert np.abs(found.drift_percent).max() < 1e-10
 
@@ -244,6 +245,90 @@ def test_a_turned_cube_freezes_as_the_cube_upright() -> None:
     expected = frozen(upright, case).solidification_time_s
     # 0.36 % measured, 0.26 % with 8 elements
     assert frozen(raster, case).solidification_time_s == pytest.approx(expected, rel=0.01)
+
+
+WALLS = {
+    "T": [(-30, 0), (-5, 0), (-5, -25), (5, -25), (5, 0), (30, 0), (30, 10), (-30, 10)],
+    "L": [(-10, -10), (30, -10), (30, 0), (0, 0), (0, 30), (-10, 30)],
+}
+"""Walls of 10 mm that meet, in mm."""
+
+
+def walls(name: str, degrees: float) -> Outline:
+    angle = math.radians(degrees)
+    turn = np.array([[math.cos(angle), -math.sin(angle)], [math.sin(angle), math.cos(angle)]])
+    off = np.array([3e-4, 2e-4]) if degrees else np.zeros(2)
+    return Outline(name, 1e-3 * np.array(WALLS[name]) @ turn.T + off)
+
+
+@lru_cache
+def walls_frozen_s(name: str, degrees: float, cells: int, way: str = "faces") -> float:
+    """When walls are solid that are so many elements thick."""
+    half, cell, body = np.full(2, 0.06), 0.01 / cells, walls(name, degrees)
+    raster = with_cut(painted(-half, half, cell, {1: body}), [body])
+    return frozen(raster, "steel in sand", way).solidification_time_s
+
+
+@pytest.mark.parametrize("name", list(WALLS))
+@pytest.mark.parametrize("degrees", [7.0, 20.0, 30.0, 45.0])
+def test_walls_that_meet_freeze_alike_at_any_angle(name: str, degrees: float) -> None:
+    upright, exact = (walls_frozen_s(name, 0.0, cells) for cells in (8, 16))
+    exact += (exact - upright) / 3
+    off = [walls_frozen_s(name, degrees, cells) / exact - 1 for cells in (4, 8)]
+    # 0.30 % measured with 8 elements a wall, 2.6 % where steps hinder heat along the surface
+    assert abs(off[1]) < 0.01
+    assert abs(walls_frozen_s(name, degrees, 8) / upright - 1) < 0.01
+    # 2.9 % measured for the L at 7 degrees, 1.6 % upright: no slower from there than upright
+    assert abs(off[0]) < 0.035
+    assert walls_frozen_s(name, degrees, 8, "difference") == pytest.approx(
+        walls_frozen_s(name, degrees, 8), rel=2e-3
+    )
+
+
+def test_heat_along_a_turned_wall_finds_no_steps() -> None:
+    # a temperature that slopes along a wall leaves every cell of it in balance
+    for degrees in (20.0, 30.0, 45.0):
+        angle = math.radians(degrees)
+        along, across = np.array([math.cos(angle), math.sin(angle)]), np.array(
+            [-math.sin(angle), math.cos(angle)])  # fmt: skip
+        corners = [s * 0.2 * along + t * 0.005 * across for s, t in
+                   ((-1, -1), (1, -1), (1, 1), (-1, 1))]  # fmt: skip
+        body, half, cell = Outline("wall", np.array(corners)), np.full(2, 0.04), 0.00125
+        raster = with_cut(painted(-half, half, cell, {1: body}), [body])
+        elements = placed(raster)
+        only = face_exchange(elements, np.array([1e-12, 1.0]), 0.0)
+        slope = elements.position_m @ along
+        row = np.repeat(np.arange(len(slope)), np.diff(only.start))
+        flow = np.bincount(row, only.rate_w_m3_k * (slope[only.neighbour] - slope[row]), len(slope))
+        inner = (elements.material == 1) & (np.abs(elements.position_m).max(axis=1) < 0.03)
+        # of the heat that one face passes; 0.5 where steps hinder it
+        assert np.abs(flow[inner]).max() * cell < 0.05
+
+
+@pytest.mark.slow
+def test_walls_that_meet_in_space_freeze_as_upright() -> None:
+    case, cell = "aluminium in a die", 0.00125
+    times = []
+    for degrees in ((0.0, 0.0), (30.0, 20.0)):
+        flat = 1e-3 * np.array(WALLS["L"], dtype=np.float64) * 0.6 + np.array([-5e-3, -5e-3])
+        flat[[2, 3, 4]] = np.array([[18e-3, 5e-3], [5e-3, 5e-3], [5e-3, 18e-3]]) - 5e-3
+        flat[[0, 1, 5]] = np.array([[-5e-3, -5e-3], [18e-3, -5e-3], [-5e-3, 18e-3]]) - 5e-3
+        n = len(flat)
+        place = np.concatenate([np.column_stack([flat, np.full(n, z)]) for z in (-0.01, 0.01)])
+        (c, a), (s, b) = np.cos(np.radians(degrees)), np.sin(np.radians(degrees))
+        place = place @ np.array([[c, -s, 0], [s, c, 0], [0, 0, 1]]).T
+        place = place @ np.array([[1, 0, 0], [0, a, -b], [0, b, a]]).T
+        caps = [(0, 3, 1), (1, 3, 2), (0, 5, 3), (3, 5, 4)]
+        sides = [f for k in range(n) for f in ((k, (k + 1) % n, n + k),
+                                               ((k + 1) % n, n + (k + 1) % n, n + k))]  # fmt: skip
+        tops = [(n + i, n + k, n + j) for i, j, k in caps]
+        body = TriangleMesh("the L", place, np.array([*caps, *sides, *tops]))
+        assert body.measure == pytest.approx(2e-2 * (23 * 10 + 13 * 10) * 1e-6)
+        half = np.full(3, 0.03)
+        raster = with_cut(painted(-half, half, cell, {1: body}), [body])
+        times.append(frozen(raster, case, "faces").solidification_time_s)
+    # 0.3 % measured
+    assert times[1] == pytest.approx(times[0], rel=0.01)
 
 
 @pytest.mark.parametrize("degrees", [45.0, 20.0, 3.0])
@@ -365,9 +450,9 @@ def test_elements_of_an_alloy_freeze_when_the_drawing_does_there() -> None:
         metal = elements.material == 1
         expected = np.interp(np.linalg.norm(elements.position_m[metal], axis=1), place, when)
         mean.append(np.abs(found.heat.frozen_s[metal] - expected).mean() / when.max())
-    # 1.5 and 0.36 % measured: of second order
-    assert mean[0] < 0.02
-    assert mean[1] < 0.35 * mean[0]
+    # 0.95 and 0.34 % measured; 1.5 and 0.36 % where steps hinder heat along the surface
+    assert mean[0] < 0.012
+    assert mean[1] < 0.4 * mean[0]
 
 
 def test_a_front_passes_the_middles_of_elements_as_neumann_says() -> None:

@@ -19,9 +19,10 @@ import numpy as np
 from scipy.spatial import cKDTree
 
 from sandmould.arrays import Flags, Floats, Ints
+from sandmould.casting.arpm.cut_links import passage_of
 from sandmould.casting.arpm.cut_volume import held_of, inside_any, volumes
 from sandmould.casting.arpm.drawn_surface import Pieces, pieces_of
-from sandmould.casting.arpm.raster import MOULD, Cut, Raster
+from sandmould.casting.arpm.raster import CASTING, Cut, Raster
 from sandmould.scenario.casting.shapes import Body
 
 _OFF = 1e-3
@@ -54,7 +55,7 @@ def with_cut(raster: Raster, solids: Sequence[Body]) -> Raster:
         Painted with the same solids. They may touch: there is no surface between them.
     solids : sequence of Body
     """
-    casting = raster.material != MOULD
+    casting = raster.material == CASTING
     faces = _faces(casting)
     if not len(faces.low):
         return raster
@@ -66,7 +67,9 @@ def with_cut(raster: Raster, solids: Sequence[Body]) -> Raster:
     cell = np.flatnonzero(volume != 1.0)
     if not len(cell) and plain.all():
         return raster
-    return replace(raster, cut=Cut(cell, volume[cell], faces.low, faces.axis, area, low_part))
+    passage = passage_of(raster, solids, held)
+    cut = Cut(cell, volume[cell], faces.low, faces.axis, area, low_part, passage)
+    return replace(raster, cut=cut)
 
 
 def _faces(casting: Flags) -> _Faces:
@@ -85,13 +88,23 @@ def _faces(casting: Flags) -> _Faces:
 
 def _bare(raster: Raster, solids: Sequence[Body]) -> Pieces:
     """The casting's surface in the mould, looking out of the casting."""
-    found = [pieces_of(solid, raster.low_m, raster.cell_m) for solid in solids]
+    step_m, found = _OFF * raster.cell_m, list[Pieces]()
+    for number, solid in enumerate(solids):
+        some = pieces_of(solid, raster.low_m, raster.cell_m)
+        shared = np.zeros(len(some.area_m2), dtype=np.bool_)
+        for other in solids[:number]:
+            # where two overlap with flush sides, the surface is there once
+            inner = some.place_m - step_m * some.normal
+            shared |= inside_any([other], inner) & ~inside_any(
+                [other], some.place_m + step_m * some.normal
+            )
+        found.append(some.only(~shared))
     pieces = Pieces(
         np.concatenate([some.place_m for some in found]),
         np.concatenate([some.normal for some in found]),
         np.concatenate([some.area_m2 for some in found]),
     )
-    step = _OFF * raster.cell_m * pieces.normal
+    step = step_m * pieces.normal
     ahead, behind = (inside_any(solids, pieces.place_m + side * step) for side in (1.0, -1.0))
     normal = np.where(ahead[:, None], -pieces.normal, pieces.normal)
     outer = pieces.place_m + np.where(ahead[:, None], -step, step)

@@ -18,14 +18,14 @@ import numpy as np
 from scipy.ndimage import maximum_filter, minimum_filter
 
 from sandmould.arrays import Flags, Floats, Ints
-from sandmould.casting.arpm.raster import MOULD, Raster, inside_solid
+from sandmould.casting.arpm.raster import CASTING, Raster, inside_solid
 from sandmould.scenario.casting.shapes import Body, Pixels
 
 SAMPLES = {2: 256, 3: 64}
 """Points of a cut cell in 2D and 3D at which it is asked what lies there."""
 LEAST_SHARE = 0.125
 """Of its cell every element keeps: what a cube's corner holds that just holds the centre."""
-_CHUNK = 500_000
+CHUNK = 500_000
 
 
 @dataclass(frozen=True)
@@ -53,7 +53,7 @@ def held_of(raster: Raster, solids: Sequence[Body]) -> Held:
         Counted at points in each cell beside one of the other material; shares of 0 or 1 and no
         lever in all others.
     """
-    casting = raster.material != MOULD
+    casting = raster.material == CASTING
     near = maximum_filter(casting, 3, mode="nearest") & ~minimum_filter(casting, 3, mode="nearest")
     cells, d, centre = np.flatnonzero(near), casting.ndim, raster.centre_m
     if not any(isinstance(solid, Pixels) for solid in solids):
@@ -61,7 +61,7 @@ def held_of(raster: Raster, solids: Sequence[Body]) -> Held:
         away_m = [np.abs(solid.distance_m(centre[cells])) for solid in solids]
         cells = cells[np.min(away_m, axis=0) <= 0.5 * math.sqrt(d) * raster.cell_m * (1.0 + 1e-9)]
     share, lever = casting.reshape(-1).astype(np.float64), np.zeros((casting.size, d))
-    for part in np.array_split(cells, max(1, -(-len(cells) * SAMPLES[d] // _CHUNK))):
+    for part in np.array_split(cells, max(1, -(-len(cells) * SAMPLES[d] // CHUNK))):
         off = _even_points(part, d) - 0.5
         place = centre[part][:, None] + off * raster.cell_m
         inside = inside_any(solids, place.reshape(-1, d)).reshape(len(part), -1)

@@ -12,11 +12,13 @@ from typing import Any, NamedTuple
 
 import numpy as np
 from numba import prange, set_num_threads
+from scipy.sparse import coo_array, csr_array
 
 from sandmould.arrays import Floats
+from sandmould.casting.arpm.exchange import resistances
 from sandmould.casting.arpm.marching import STEP_SHARE, Heat
 from sandmould.casting.arpm.material import EnthalpyTable, temperature_of
-from sandmould.casting.arpm.raster import Raster
+from sandmould.casting.arpm.raster import BesideFaces, Raster
 from sandmould.compiled import njit
 
 
@@ -31,6 +33,10 @@ class HeatGrid(NamedTuple):
     """(nx, ny, nz) int64."""
     thinner: Any
     """(nx, ny, nz) float64: a cell's volume over what it holds; (0, 0, 0) where all hold it."""
+    link_start: Any
+    link_cell: Any
+    link_rate: Floats
+    """Cells that heat joins past a drawn surface, by the cell, and their rates, W/m3/K."""
     rows: Floats
     reference: float
     """See ``EnthalpyTable``."""
@@ -44,7 +50,7 @@ class DifferenceSteps:
         raster: Raster,
         table: EnthalpyTable,
         conductivity_w_m_k: Floats,
-        resistance_m2k_w: float,
+        resistance_m2k_w: float | Floats,
         share: float = STEP_SHARE,
         threads: int = 1,
     ) -> None:
@@ -55,7 +61,7 @@ class DifferenceSteps:
         raster : Raster
         table : EnthalpyTable
         conductivity_w_m_k : (m,) float64, W/m/K
-        resistance_m2k_w : float, m2 K/W
+        resistance_m2k_w : float or (m, m) float64, m2 K/W
         share : float
             Of the longest stable step.
         threads : int
@@ -63,22 +69,23 @@ class DifferenceSteps:
         # a plane is a box of one layer
         shape = (1,) * (3 - raster.material.ndim) + raster.material.shape
         material = raster.material.reshape(shape)
+        resistance = resistances(resistance_m2k_w, len(conductivity_w_m_k))
         along_x, along_y, along_z = (
-            _between(material, axis, raster, conductivity_w_m_k, resistance_m2k_w)
-            for axis in range(3)
+            _between(material, axis, raster, conductivity_w_m_k, resistance) for axis in range(3)
         )
         rate = np.zeros(shape)
         for axis, along in enumerate((along_x, along_y, along_z)):
             rate += along + np.roll(along, 1, axis=axis)
         self.volume_m3 = np.full(material.size, raster.cell_m**raster.material.ndim)
-        thinner = np.zeros((0, 0, 0))
+        thinner, links = np.zeros((0, 0, 0)), csr_array((0, 0))
         if raster.cut:
             self.volume_m3[raster.cut.cell] *= raster.cut.volume_share
             thinner = np.ones(shape)
             thinner.reshape(-1)[raster.cut.cell] = 1.0 / raster.cut.volume_share
-            rate *= thinner
-        self._grid = HeatGrid(along_x, along_y, along_z, material, thinner, table.rows,
-                              table.reference_k)  # fmt: skip
+            links = _links(raster, raster.cut.passage, conductivity_w_m_k)
+            rate = (rate + links.sum(axis=1).reshape(shape)) * thinner
+        self._grid = HeatGrid(along_x, along_y, along_z, material, thinner, links.indptr,
+                              links.indices, links.data, table.rows, table.reference_k)  # fmt: skip
         self.step_s = share * float((table.rows[material, 0] / rate).min())
         self._threads = threads
 
@@ -95,13 +102,13 @@ class DifferenceSteps:
         heat.element_steps += steps * self._grid.material.size
 
 
-def _between(material: Any, axis: int, raster: Raster, conductivity: Floats, resistance: float
+def _between(material: Any, axis: int, raster: Raster, conductivity: Floats, resistance: Floats
              ) -> Floats:  # fmt: skip
     """Rate (W/K over a whole cell's volume) between each cell and the next; 0 behind the last."""
     rate, cell_m, n = np.zeros(material.shape), raster.cell_m, material.shape[axis]
     before, after = (np.take(material, range(k, n - 1 + k), axis=axis) for k in (0, 1))
     path = 0.5 * cell_m / conductivity[before] + 0.5 * cell_m / conductivity[after]
-    path += np.where(before != after, resistance, 0.0)
+    path += resistance[before, after]
     inner = [slice(None)] * 3
     inner[axis] = slice(0, n - 1)
     rate[tuple(inner)] = 1.0 / (path * cell_m)
@@ -112,11 +119,22 @@ def _between(material: Any, axis: int, raster: Raster, conductivity: Floats, res
         high = tuple(at + (k == axis) for k, at in enumerate(low))
         path = cell_m * part / conductivity[material[low]]
         path += cell_m * (1.0 - part) / conductivity[material[high]]
-        if resistance > 0.0:
-            rate[low] = area / ((path * area + resistance) * cell_m)
-        else:
-            rate[low] = 1.0 / (path * cell_m)
+        resists = resistance[material[low], material[high]]
+        area = np.where(resists > 0.0, area, 1.0)
+        rate[low] = area / ((path * area + resists) * cell_m)
+        passage = raster.cut.passage
+        within = passage.axis == axis - (3 - raster.material.ndim)
+        rate[np.unravel_index(passage.low[within], material.shape)] *= passage.share[within]
     return rate
+
+
+def _links(raster: Raster, passage: BesideFaces, conductivity: Floats) -> csr_array:
+    """Rates between cells that heat joins past a surface, as of ``_between``."""
+    first, second = passage.link
+    k = conductivity[raster.material.reshape(-1)[first]]
+    rate = np.tile(k * passage.link_share / raster.cell_m**2, 2)
+    pair = np.concatenate([first, second]), np.concatenate([second, first])
+    return coo_array((rate, pair), (raster.material.size,) * 2).tocsr()
 
 
 @njit(parallel=True)
@@ -125,7 +143,7 @@ def _difference_steps(
     frozen: Any,
 ) -> Any:  # fmt: skip
     """Take explicit steps; enthalpy and freezing times change in place, temperatures come back."""
-    through_x, through_y, through_z, material, thinner, rows, reference = grid
+    through_x, through_y, through_z, material, thinner, start, cell, along, rows, reference = grid
     nx, ny, nz = enthalpy.shape
     now, then = temperature.copy(), np.empty_like(temperature)
     for step in range(steps):
@@ -146,6 +164,9 @@ def _difference_steps(
                 if z < nz - 1:
                     taken += through_z[x, y, z] * (now[x, y, z + 1] - own)
                 if thinner.size:
+                    for k in range(start[line * nz + z], start[line * nz + z + 1]):
+                        at = cell[k]
+                        taken += along[k] * (now[at // nz // ny, at // nz % ny, at % nz] - own)
                     taken *= thinner[x, y, z]
                 before, m = enthalpy[x, y, z], material[x, y, z]
                 after = before + dt * taken
@@ -154,5 +175,7 @@ def _difference_steps(
                 if before >= rows[m, 1] > after:
                     share = (before - rows[m, 1]) / (before - after)
                     frozen[x, y, z] = time_s + (step + share) * dt
+                elif after >= rows[m, 1] > before:
+                    frozen[x, y, z] = np.nan
         now, then = then, now
     return now

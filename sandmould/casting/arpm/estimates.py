@@ -16,8 +16,9 @@ from scipy.ndimage import distance_transform_edt
 from scipy.special import erfc, erfcx
 
 from sandmould.arrays import Flags, Floats, Ints
-from sandmould.casting.arpm.material import ThermalMaterial, enthalpy_table
-from sandmould.casting.arpm.raster import MOULD, Raster
+from sandmould.casting.arpm.material import enthalpy_table, thermal
+from sandmould.casting.arpm.raster import CASTING, Raster
+from sandmould.scenario.casting.curves import Curve, along
 from sandmould.scenario.casting.solidification import Solidification
 
 WINDOW = 2.25
@@ -49,9 +50,10 @@ class Cooled:
         return self.sand_m3 / self.surface_m2 if self.surface_m2 > 0.0 else 0.0
 
 
-def cooled(raster: Raster) -> Cooled:
+def cooled(raster: Raster, inserts: int = 0) -> Cooled:
     """Volumes and surfaces of a casting on a grid: of the drawing where the grid has its cut."""
-    mask, d, cell_m = raster.material != MOULD, raster.material.ndim, raster.cell_m
+    mask, d, cell_m = raster.material == CASTING, raster.material.ndim, raster.cell_m
+    sand = ~mask & (raster.material <= CASTING + inserts)
     if mask.all():
         volume_m3 = float(mask.sum()) * cell_m**d
         return Cooled(math.inf, math.inf, volume_m3, 0.0, 0.0)
@@ -74,7 +76,7 @@ def cooled(raster: Raster) -> Cooled:
         modulus_m=window_m3 / of_window if of_window > 0.0 else math.inf,
         volume_m3=float(volume[mask].sum()),
         surface_m2=float(surface.sum()),
-        sand_m3=float(volume[~mask].sum()),
+        sand_m3=float(volume[sand].sum()),
     )
 
 
@@ -98,20 +100,50 @@ def _away2(place: Any, centre: Ints) -> Any:
     return sum((line - at) ** 2 for line, at in zip(place, centre, strict=True))
 
 
+def typical(curve: Curve | None, low: float, high: float) -> float:
+    """Mean of a curve between two temperatures or times; 0 for none."""
+    if curve is None:
+        return 0.0
+    return (
+        float(along(curve, np.linspace(low, high, 100)).mean())
+        if isinstance(curve, tuple)
+        else curve
+    )
+
+
+def resistance_m2k_w(scenario: Solidification) -> float:
+    """Resistance between casting and mould as a plan takes it, with the coating."""
+    curve, start = scenario.heat_transfer_w_m2_k, scenario.initial_k
+    low, high = start.mould, start.casting
+    if scenario.heat_transfer_over == "time" and isinstance(curve, tuple):
+        low, high = curve[0][0], curve[-1][0]
+    bare = typical(curve, low, high)
+    return (1.0 / bare if bare else 0.0) + scenario.coating_m2k_w
+
+
 def heat_to_lose_j_m3(scenario: Solidification) -> float:
     """Heat of the casting above its solidus: none of one that is poured there."""
-    metal = scenario.casting
-    material = ThermalMaterial(**metal.model_dump())
-    table = enthalpy_table([material], metal.solidus_k)
-    poured_k = np.array([scenario.initial_k.casting])
-    return float(table.enthalpy_j_m3(poured_k, np.zeros(1, dtype=np.int64))[0])
+    metal, poured_k = thermal(scenario.casting), scenario.initial_k.casting
+    table = enthalpy_table([metal], metal.solidus_k, poured_k)
+    heat = table.enthalpy_j_m3(np.array([poured_k]), np.zeros(1, dtype=np.int64))[0]
+    return max(float(heat - table.rows[0, 1]), 0.0)
+
+
+def mould_of(scenario: Solidification) -> tuple[float, float]:
+    """Conductivity (W/m/K) and heat capacity (J/m3/K) of the mould as it warms to the solidus."""
+    low_k, high_k = scenario.initial_k.mould, scenario.casting.solidus_k
+    it = thermal(scenario.mould)
+    k, density, heat = (
+        typical(curve, low_k, high_k)
+        for curve in (it.conductivity_w_m_k, it.density_kg_m3, it.heat_capacity_j_kg_k)
+    )
+    return k, density * heat
 
 
 def sand_takes_j_m3(scenario: Solidification) -> float:
     """Heat that warms the mould from its start to the solidus."""
-    mould = scenario.mould
     warming_k = scenario.casting.solidus_k - scenario.initial_k.mould
-    return mould.density_kg_m3 * mould.heat_capacity_j_kg_k * warming_k
+    return mould_of(scenario)[1] * warming_k
 
 
 def least_sand_share(scenario: Solidification, it: Cooled) -> float:
@@ -166,13 +198,17 @@ def _lacks_j_m2(scenario: Solidification, it: Cooled, depth_m: float, time_s: fl
     By then its skin is colder than the solidus: on the average half of what drives the heat at that
     time through the metal.
     """
-    metal = scenario.casting
+    metal, poured_k = scenario.casting, scenario.initial_k.casting
     taken = taken_j_m2(scenario, it, depth_m, time_s)
     flux_w_m2 = (taken_j_m2(scenario, it, depth_m, (1.0 + _LATER) * time_s) - taken) / (
         _LATER * time_s
     )
-    colder_k = 0.5 * flux_w_m2 * it.thickest_m / metal.conductivity_w_m_k
-    skin_j_m3 = metal.density_kg_m3 * metal.heat_capacity_j_kg_k * colder_k
+    k, density, heat = (
+        typical(curve, metal.solidus_k, poured_k)
+        for curve in (metal.conductivity_w_m_k, metal.density_kg_m3, metal.heat_capacity_j_kg_k)
+    )
+    colder_k = 0.5 * flux_w_m2 * it.thickest_m / k
+    skin_j_m3 = density * heat * colder_k
     return (heat_to_lose_j_m3(scenario) + skin_j_m3) * it.modulus_m - taken
 
 
@@ -187,12 +223,13 @@ def taken_j_m2(scenario: Solidification, it: Cooled, depth_m: float, time_s: flo
     p = (g + h)/c; with g = 0 that is Carslaw and Jaeger, Conduction of Heat in Solids, 2.7. Heat
     that the box throws back is taken off.
     """
-    mould, transfer = scenario.mould, scenario.heat_transfer_w_m2_k
+    metal, start = scenario.casting, scenario.initial_k
     # half of the metal is solid on the average, and heat has to pass it
-    resistance = 0.5 * it.thickest_m / scenario.casting.conductivity_w_m_k
-    h = 1.0 / (resistance + (1.0 / transfer if transfer else 0.0))
-    k = mould.conductivity_w_m_k
-    capacity_j_m3_k = mould.density_kg_m3 * mould.heat_capacity_j_kg_k
+    resistance = (
+        0.5 * it.thickest_m / typical(metal.conductivity_w_m_k, metal.solidus_k, start.casting)
+    )
+    h = 1.0 / (resistance + resistance_m2k_w(scenario))
+    k, capacity_j_m3_k = mould_of(scenario)
     warming_k = scenario.casting.solidus_k - scenario.initial_k.mould
     curved = min(max(it.thickest_m / it.modulus_m - 1.0, 0.0), 2.0)
     g = 0.5 * k * curved / it.thickest_m

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 from dataclasses import dataclass
 
 import numpy as np
@@ -10,6 +9,8 @@ from numpy.typing import NDArray
 from scipy.sparse import coo_array
 
 from sandmould.arrays import Floats, Ints
+from sandmould.casting.arpm.raster import CASTING
+from sandmould.casting.arpm.varying import VaryingFaces
 
 
 @dataclass(frozen=True)
@@ -24,6 +25,8 @@ class Exchange:
     """(p,) float64, W/m3/K."""
     volume_m3: Floats
     """(n,) float64, m3, or m2 in 2D."""
+    varying: VaryingFaces | None = None
+    """Faces whose conductance is not always the same; the rates are then the largest ones."""
 
     def limit_s(self, capacity_j_m3_k: Floats) -> Floats:
         """Longest stable explicit step of each element, (n,) float64, s.
@@ -69,15 +72,25 @@ def from_rows(row: Ints, column: Ints, rate_w_m3_k: Floats, volume_m3: Floats) -
     )
 
 
-def check_resistance(resistance_m2k_w: float) -> None:
-    """Refuse what is no resistance.
+def resistances(resistance_m2k_w: float | Floats, count: int) -> Floats:
+    """Resistance between each two of some materials, (count, count) float64, m2 K/W.
+
+    Parameters
+    ----------
+    resistance_m2k_w : float or (count, count) float64, m2 K/W
+        A number acts where the casting meets another material: two moulds lie in one another.
 
     Raises
     ------
     ValueError
-        When it is negative or not finite.
+        When one is negative or not finite.
     """
-    if not (resistance_m2k_w >= 0.0 and math.isfinite(resistance_m2k_w)):
+    found = np.asarray(resistance_m2k_w, dtype=np.float64)
+    if not (np.isfinite(found).all() and (found >= 0.0).all()):
         raise ValueError(
             f"resistance_m2k_w is {resistance_m2k_w}; it must be finite and at least 0"
         )
+    if found.ndim:
+        return found
+    cast = np.arange(count) == CASTING
+    return np.where(cast[:, None] != cast, found, 0.0)

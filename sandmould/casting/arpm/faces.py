@@ -10,14 +10,16 @@ flux, and the matrix stays symmetric.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
+from scipy.sparse import coo_array, csr_array, eye_array, vstack
 
 from sandmould.arrays import Flags, Floats, Ints
 from sandmould.casting.arpm.elements import Elements
-from sandmould.casting.arpm.exchange import Exchange, check_resistance, from_rows
+from sandmould.casting.arpm.exchange import Exchange, from_rows, resistances
 from sandmould.casting.arpm.raster import Cut
+from sandmould.casting.arpm.varying import Curves, MetFaces, varying_faces
 
 
 @dataclass(frozen=True)
@@ -32,7 +34,8 @@ class Faces:
     area_m2: Floats
     """(f,) float64, m2, or m in 2D: of the grid."""
     drawn_share: Floats
-    """(f,) float64: the drawn surface's area over ``area_m2``; 1 within a material."""
+    """(f,) float64: the drawn surface's area over ``area_m2``; within a material what of the face
+    lies in it."""
     first_part: Floats
     """(f,) float64: of the line between the cells' centres on both sides, that in the first's
     material."""
@@ -95,20 +98,29 @@ def faces_of(elements: Elements) -> Faces:
 def _drawn(cut: Cut, shape: tuple[int, ...], axis: int, apart: Flags, of: Ints, count: Ints
            ) -> tuple[Floats, Floats]:  # fmt: skip
     """Means of the surface's share and the path's part over the cells' faces of each pair."""
-    own = cut.axis == axis
-    at = np.unravel_index(cut.low[own], shape)
+    own, within = cut.axis == axis, cut.passage.axis == axis
     inner = tuple(k - (i == axis) for i, k in enumerate(shape))
-    place = np.ravel_multi_index(at, inner)
+    place, open_place = (
+        np.ravel_multi_index(np.unravel_index(low, shape), inner)
+        for low in (cut.low[own], cut.passage.low[within])
+    )
     means = []
     for values, plain in ((cut.area_share[own], 1.0), (cut.low_part[own], 0.5)):
         all_faces = np.full(len(apart), plain)
         all_faces[place] = values
+        if plain == 1.0:
+            all_faces[open_place] = cut.passage.share[within]
         means.append(np.bincount(of, all_faces[apart], len(count)) / count)
     return means[0], means[1]
 
 
-def face_exchange(elements: Elements, conductivity_w_m_k: Floats, resistance_m2k_w: float,
-                  consistent: bool = True) -> Exchange:  # fmt: skip
+def face_exchange(
+    elements: Elements,
+    conductivity_w_m_k: Floats,
+    resistance_m2k_w: float | Floats,
+    consistent: bool = True,
+    curves: Curves | None = None,
+) -> Exchange:
     """Rates over true faces.
 
     Parameters
@@ -117,32 +129,70 @@ def face_exchange(elements: Elements, conductivity_w_m_k: Floats, resistance_m2k
         On a grid, as :func:`sandmould.casting.arpm.elements.placed` makes them.
     conductivity_w_m_k : (m,) float64, W/m/K
         Of each material.
-    resistance_m2k_w : float, m2 K/W
-        On faces between different materials.
+    resistance_m2k_w : float or (m, m) float64, m2 K/W
+        As of ``resistances``.
     consistent : bool
         Whether small faces on one large face share their flux; without it each has its own.
+    curves : Curves, optional
+        What conductivities and resistances follow; those given are then the largest and the least.
     """
-    check_resistance(resistance_m2k_w)
+    between = resistances(resistance_m2k_w, len(conductivity_w_m_k))
     faces = faces_of(elements)
     material, half = elements.material, 0.5 * elements.size_m
-    differ = material[faces.first] != material[faces.second]
     # what the surface is off the face between the two, from the first's side to the second's
     off = (faces.first_part - 0.5) * elements.grid_m
-    path = sum(
-        (half[i] + side * off) / conductivity_w_m_k[material[i]]
-        for i, side in ((faces.first, 1.0), (faces.second, -1.0))
-    )
-    conductance = faces.area_m2 / path
-    if resistance_m2k_w > 0.0:
-        share = np.where(differ, faces.drawn_share, 1.0)
-        path = path * share + np.where(differ, resistance_m2k_w, 0.0)
-        conductance = faces.area_m2 * share / path
     first, second = faces.first, faces.second
+    length = np.stack([half[first] + off, half[second] - off])
+    area, share = faces.area_m2, faces.drawn_share
+    if elements.cut:
+        k, other, through = _links(elements)
+        first, second = np.concatenate([first, k]), np.concatenate([second, other])
+        length = np.hstack([length, 0.5 * elements.grid_m * np.ones((2, len(k)))])
+        area = np.concatenate([area, through])
+        share = np.concatenate([share, np.ones(len(k))])
+    resists = between[material[first], material[second]]
+    within = material[first] == material[second]
+    area = area * np.where(within, share, 1.0)
+    share = np.where(~within & (resists > 0.0), share, 1.0)
+    path = length[0] / conductivity_w_m_k[material[first]]
+    path += length[1] / conductivity_w_m_k[material[second]]
+    conductance = area * share / (path * share + resists)
+    met = MetFaces(first, second, length, area, share, np.empty(0, dtype=np.int64), material)
+    into: csr_array = eye_array(len(first), format="csr")
     if consistent:
-        extra = _shared(elements, faces, conductance)
-        first, second = np.concatenate([first, extra[0]]), np.concatenate([second, extra[1]])
-        conductance = np.concatenate([conductance, extra[2]])
-    return over_faces(first, second, conductance, elements.volume_m3)
+        k, other, added, sum_of = _shared(elements, faces, conductance)
+        first, second = np.concatenate([first, k]), np.concatenate([second, other])
+        conductance = np.concatenate([conductance, added])
+        into = vstack([into, sum_of], format="csr")
+    exchange = over_faces(first, second, conductance, elements.volume_m3)
+    if curves is None:
+        return exchange
+    number = np.full(between.shape, -1)
+    for place, pair in enumerate(curves.transfers):
+        number[pair] = number[pair[::-1]] = place
+    met = met._replace(transfer=number[material[met.first], material[met.second]])
+    into = _into_rates(exchange, first, second) @ into
+    return replace(exchange, varying=varying_faces(met, into, curves))
+
+
+def _into_rates(exchange: Exchange, first: Ints, second: Ints) -> csr_array:
+    """Which conductances of pairs make which rates, (p, pairs) sparse, 1/m3."""
+    n = len(exchange.volume_m3)
+    row, column = np.concatenate([first, second]), np.concatenate([second, first])
+    own = np.repeat(np.arange(n), np.diff(exchange.start)) * n + exchange.neighbour
+    entry = np.searchsorted(own, row * n + column)
+    pair = np.tile(np.arange(len(first)), 2)
+    return coo_array((1.0 / exchange.volume_m3[row], (entry, pair)), (len(own), len(first))).tocsr()
+
+
+def _links(elements: Elements) -> tuple[Ints, Ints, Floats]:
+    """Elements that heat joins past the surface, and the area (m2) that it has for that."""
+    assert elements.cut is not None
+    owner, passage = owners(elements).reshape(-1), elements.cut.passage
+    first, second = owner[passage.link]
+    apart = first != second
+    area = passage.link_share[apart] * elements.grid_m ** (elements.dimensions - 1)
+    return first[apart], second[apart], area
 
 
 def over_faces(first: Ints, second: Ints, conductance_w_k: Floats, volume_m3: Floats) -> Exchange:
@@ -160,11 +210,12 @@ def over_faces(first: Ints, second: Ints, conductance_w_k: Floats, volume_m3: Fl
 
 
 def _shared(elements: Elements, faces: Faces, conductance: Floats
-            ) -> tuple[Ints, Ints, Floats]:  # fmt: skip
+            ) -> tuple[Ints, Ints, Floats, csr_array]:  # fmt: skip
     """Pairs of small elements on one large face, and what sharing its flux adds between them.
 
     With shares a_k of the large face, q = h (T_large - sum a_k T_k) on all of it: beside the
-    plain exchange this couples k and l by -a_k a_l times the conductance of the whole face.
+    plain exchange this couples k and l by -a_k a_l times the conductance of the whole face. Last
+    comes how that is made of the faces' conductances.
     """
     size = elements.size_m
     first_larger = size[faces.first] > size[faces.second] * (1.0 + 1e-9)
@@ -181,6 +232,7 @@ def _shared(elements: Elements, faces: Faces, conductance: Floats
     count = np.diff(np.append(begin, len(key)))
     empty = np.empty(0, dtype=np.int64)
     pairs = [(empty, empty, np.empty(0))]
+    parts: list[csr_array] = [csr_array((0, len(conductance)))]
     for number in np.unique(count[count > 1]):
         rows = begin[count == number][:, None] + np.arange(number)
         whole = np.isclose(area[rows].sum(axis=1), size[large[rows[:, 0]]] ** (
@@ -191,5 +243,9 @@ def _shared(elements: Elements, faces: Faces, conductance: Floats
         total = through[rows].sum(axis=1)[:, None]
         added = np.broadcast_to(-total / number**2, (len(rows), len(k)))
         pairs.append((small[rows[:, k]].ravel(), small[rows[:, other]].ravel(), added.ravel()))
+        of = np.repeat(jump[order][rows], len(k), axis=0)
+        begins = number * np.arange(len(of) + 1)
+        value = np.full(of.size, -1.0 / number**2)
+        parts.append(csr_array((value, of.ravel(), begins), (len(of), len(conductance))))
     first, second, added = (np.concatenate(part) for part in zip(*pairs, strict=True))
-    return first, second, added
+    return first, second, added, vstack(parts, format="csr")

@@ -3,14 +3,22 @@
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from itertools import combinations
 
 import numpy as np
 
 from sandmould.arrays import Flags, Floats
 from sandmould.casting.arpm.elements import Elements
+from sandmould.casting.arpm.exchange import resistances
 from sandmould.casting.arpm.marching import Heat, Substance
 from sandmould.casting.arpm.material import EnthalpyTable, ThermalMaterial, enthalpy_table
+from sandmould.casting.arpm.varying import Curves, Transfer
+from sandmould.scenario.casting.curves import ends
+
+OUTSIDE = 0.05
+"""Of the range of initial temperatures: farther out no stable step leads."""
 
 
 @dataclass(frozen=True)
@@ -27,7 +35,9 @@ class Filling:
     """The first is the mould."""
     initial_k: tuple[float, ...]
     resistance_m2k_w: float = 0.0
-    """1/h of eq. (2)."""
+    """1/h of eq. (2): between the casting and every other material."""
+    transfers: Mapping[tuple[int, int], Transfer] = field(default_factory=dict)
+    """Of two materials, the smaller number first, where another one acts."""
 
     def __post_init__(self) -> None:
         if len(self.initial_k) != len(self.materials) or not self.materials:
@@ -40,13 +50,37 @@ class Filling:
 
     @property
     def conductivity_w_m_k(self) -> Floats:
-        """(m,) float64, W/m/K."""
-        return np.array([it.conductivity_w_m_k for it in self.materials])
+        """Largest of each material, (m,) float64, W/m/K."""
+        return np.array([ends(it.conductivity_w_m_k)[1] for it in self.materials])
+
+    @property
+    def least_m2k_w(self) -> Floats:
+        """Least resistance between each two materials, (m, m) float64, m2 K/W."""
+        found = resistances(self.resistance_m2k_w, len(self.materials))
+        for pair, transfer in self.transfers.items():
+            found[pair] = found[pair[::-1]] = transfer.least_m2k_w
+        return found
+
+    @property
+    def curves(self) -> Curves | None:
+        """What conductances follow; None where they are always the same."""
+        if not any(isinstance(it.conductivity_w_m_k, tuple) for it in self.materials) and not any(
+            it.varies for it in self.transfers.values()
+        ):
+            return None
+        least = self.least_m2k_w
+        transfers = {
+            (i, j): self.transfers.get((i, j), Transfer(1.0 / least[i, j] if least[i, j] else None))
+            for i, j in combinations(range(len(least)), 2)
+        }
+        low_k, high_k = min(self.initial_k), max(self.initial_k)
+        beyond_k = OUTSIDE * (high_k - low_k) + 1.0
+        return Curves(self.materials, transfers, low_k - beyond_k, high_k + beyond_k)
 
     @property
     def table(self) -> EnthalpyTable:
         """Enthalpy counted from the coldest initial temperature: heat that can be lost."""
-        return enthalpy_table(self.materials, min(self.initial_k))
+        return enthalpy_table(self.materials, min(self.initial_k), max(self.initial_k))
 
     def melts(self, elements: Elements) -> Flags:
         """Which elements solidify, (n,) bool."""

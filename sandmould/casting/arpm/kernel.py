@@ -15,7 +15,7 @@ from scipy.spatial import cKDTree
 
 from sandmould.arrays import Floats, Ints
 from sandmould.casting.arpm.elements import Elements
-from sandmould.casting.arpm.exchange import Exchange, check_resistance, from_rows
+from sandmould.casting.arpm.exchange import Exchange, from_rows, resistances
 
 Form = Literal["printed", "corrected", "symmetric"]
 """(4) as printed; (4) corrected; corrected with the mean of 1/n_i and 1/n_j, which conserves
@@ -106,7 +106,8 @@ def neighbours(elements: Elements, kernel_size: float) -> tuple[Ints, Ints, Floa
     return first[near], number[second[near]], distance[near]
 
 
-def kernel_exchange(elements: Elements, conductivity_w_m_k: Floats, resistance_m2k_w: float,
+def kernel_exchange(elements: Elements, conductivity_w_m_k: Floats,
+                    resistance_m2k_w: float | Floats,
                     kernel_size: float = 2.1, form: Form = "corrected",
                     refuse_ratio: bool = True) -> Exchange:  # fmt: skip
     """Rates of eq. (5), with neighbours found once.
@@ -116,8 +117,8 @@ def kernel_exchange(elements: Elements, conductivity_w_m_k: Floats, resistance_m
     elements : Elements
     conductivity_w_m_k : (m,) float64, W/m/K
         Of each material.
-    resistance_m2k_w : float, m2 K/W
-        Between elements of different materials.
+    resistance_m2k_w : float or (m, m) float64, m2 K/W
+        As of ``resistances``.
     kernel_size : float
         c_k; the paper takes 2.1 and tries 1.4 to 4.2.
     form : Form
@@ -132,7 +133,7 @@ def kernel_exchange(elements: Elements, conductivity_w_m_k: Floats, resistance_m
     """
     if not 1.0 < kernel_size <= 6.0:
         raise ValueError(f"the kernel size is {kernel_size}; it must be above 1 and at most 6")
-    check_resistance(resistance_m2k_w)
+    between = resistances(resistance_m2k_w, len(conductivity_w_m_k))
     own, other, distance = neighbours(elements, kernel_size)
     size, other_size, d = elements.size_m[own], elements.size_m[other], elements.dimensions
     if refuse_ratio:
@@ -149,7 +150,7 @@ def kernel_exchange(elements: Elements, conductivity_w_m_k: Floats, resistance_m
         inverse = 0.5 * (inverse + 1.0 / density[other])
     half = 0.5 / conductivity_w_m_k
     material, other_material = elements.material[own], elements.material[other]
-    at_interface = np.where(material != other_material, resistance_m2k_w / distance, 0.0)
+    at_interface = between[material, other_material] / distance
     conductivity = 1.0 / (half[material] + half[other_material] + at_interface)
     rate = 2.0 * d * inverse * conductivity * weights / distance**2
     apart = own != other

@@ -19,9 +19,13 @@ from sandmould.arrays import Floats, Ints
 from sandmould.casting.arpm.exchange import Exchange
 from sandmould.casting.arpm.marching import STEP_SHARE, Heat, HeatSystem, Substance
 from sandmould.casting.arpm.material import temperature_of
+from sandmould.casting.arpm.varying import VaryingFaces
 from sandmould.compiled import njit
 
 MOST_LEVELS = 8
+LOOKED_AT, CHANGED_K = 64, 5.0
+"""Shortest steps after which it is looked whether conductances that vary are to be found anew, and
+the change of a temperature from which they are."""
 
 
 class Levels(NamedTuple):
@@ -64,6 +68,7 @@ class LocalSteps:
         octave = np.floor(np.log2(np.minimum(limit_s / self._shortest_s, 2.0**most_levels)))
         level = np.minimum(octave.astype(np.int64), most_levels - 1)
         self._threads = threads
+        self._varying: VaryingFaces | None = None
         self._order = np.argsort(level, kind="stable")
         self._sort(exchange, substance, level[self._order])
         self.volume_m3 = exchange.volume_m3
@@ -83,6 +88,8 @@ class LocalSteps:
             start, neighbour, exchange.rate_w_m3_k[entry], substance.material[order],
             substance.table.rows, substance.table.reference_k,
         )  # fmt: skip
+        if exchange.varying is not None:
+            self._varying = exchange.varying.sorted(back, substance.material[order], entry)
         end = np.searchsorted(level, np.arange(int(level.max()) + 1), side="right")
         row = np.repeat(np.arange(len(level)), count)
         slowest, fastest = level.copy(), level.copy()
@@ -106,10 +113,20 @@ class LocalSteps:
             for values in (heat.enthalpy_j_m3, heat.temperature_k, heat.frozen_s)
         )
         set_num_threads(self._threads)
-        _local_steps(
-            cycles, duration_s / (cycles * substeps), heat.time_s, levels, self._system, enthalpy,
-            temperature, frozen,
-        )  # fmt: skip
+        dt = duration_s / (cycles * substeps)
+        some, last_k = max(1, LOOKED_AT // substeps), np.full(len(temperature), np.nan)
+        for begin in range(0, cycles, cycles if self._varying is None else some):
+            end_of = cycles if self._varying is None else min(begin + some, cycles)
+            if self._varying is not None and (
+                self._varying.over_time or not np.abs(temperature - last_k).max() < CHANGED_K
+            ):
+                middle_s = heat.time_s + 0.5 * (begin + end_of) * substeps * dt
+                self._system.rate[:] = self._varying.rates_w_m3_k(temperature, middle_s)
+                last_k = temperature.copy()
+            _local_steps(
+                begin * substeps, end_of * substeps, dt, heat.time_s, levels, self._system,
+                enthalpy, temperature, frozen,
+            )  # fmt: skip
         heat.enthalpy_j_m3[self._order] = enthalpy
         heat.temperature_k[self._order] = temperature
         heat.frozen_s[self._order] = frozen
@@ -149,6 +166,8 @@ def _update(
         if before >= rows[m, 1] > after:
             share = (before - rows[m, 1]) / (before - after)
             frozen[i] = time_s + at * dt - (1.0 - share) * own_dt
+        elif after >= rows[m, 1] > before:
+            frozen[i] = np.nan
 
 
 @njit(parallel=True)
@@ -174,14 +193,13 @@ def _integrate(
 
 @njit()
 def _local_steps(
-    cycles: int, dt: float, time_s: float, levels: Levels, system: HeatSystem, enthalpy: Floats,
-    temperature: Floats, frozen: Floats,
+    begin: int, stop: int, dt: float, time_s: float, levels: Levels, system: HeatSystem,
+    enthalpy: Floats, temperature: Floats, frozen: Floats,
 ) -> None:  # fmt: skip
-    """Take cycles of 2^(levels - 1) of the shortest steps."""
+    """Take the shortest steps from one to another, both ends of cycles of 2^(levels - 1)."""
     end = levels.end
-    substeps = 1 << (len(end) - 1)
     integral, new = np.zeros((len(enthalpy), len(end))), np.empty(len(enthalpy))
-    for at in range(1, cycles * substeps + 1):
+    for at in range(begin + 1, stop + 1):
         highest = 0
         while highest < len(end) - 1 and at % (1 << (highest + 1)) == 0:
             highest += 1

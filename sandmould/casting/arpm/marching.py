@@ -28,7 +28,8 @@ class Heat:
     temperature_k: Floats
     """(n,) float64, K."""
     frozen_s: Floats
-    """(n,) float64, s: when each fell below its solidus; NaN before, and where nothing melts."""
+    """(n,) float64, s: when each fell below its solidus; NaN before, once molten again, and where
+    nothing melts."""
     time_s: float = 0.0
     element_steps: int = 0
     """Evaluations of (5) for one element so far."""
@@ -68,7 +69,15 @@ class HeatSystem(NamedTuple):
 
 
 def heat_system(exchange: Exchange, substance: Substance) -> HeatSystem:
-    """What an exchange and a substance make together."""
+    """What an exchange and a substance make together.
+
+    Raises
+    ------
+    ValueError
+        When conductances vary, which local steps alone follow.
+    """
+    if exchange.varying is not None:
+        raise ValueError("conductances that vary need local steps")
     return HeatSystem(
         exchange.start,
         exchange.neighbour,
@@ -152,5 +161,7 @@ def _explicit_steps(
             if before >= rows[m, 1] > after:
                 share = (before - rows[m, 1]) / (before - after)
                 frozen[i] = time_s + (step + share) * dt
+            elif after >= rows[m, 1] > before:
+                frozen[i] = np.nan
         now, then = then, now
     return now

@@ -1,21 +1,38 @@
-"""Materials that conduct and solidify, and temperature as a function of enthalpy."""
+"""Materials that conduct and solidify, and temperature as a function of enthalpy.
+
+Properties are numbers or curves over temperature. Elements keep their volume: a density that falls
+with temperature counts as heat that a volume holds, not as metal that leaves it.
+"""
 
 from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
 
 from sandmould.arrays import Floats, Ints
 from sandmould.compiled import njit
+from sandmould.scenario.casting.curves import (
+    QUARTZ_KG_M3,
+    Curve,
+    along,
+    curve_fault,
+    ends,
+    packed_w_m_k,
+)
+from sandmould.scenario.casting.solidification import Metal, MouldMaterial
+
+PROPERTIES = ("density_kg_m3", "heat_capacity_j_kg_k", "conductivity_w_m_k")
+NODES = 1024
+"""Of a table of temperature over enthalpy: a node each two kelvin or so."""
 
 
 @dataclass(frozen=True)
 class ThermalMaterial:
-    """Constant properties; between solidus and liquidus the latent heat goes linearly.
+    """What conducts heat, and may freeze.
 
     Raises
     ------
@@ -24,19 +41,21 @@ class ThermalMaterial:
     """
 
     name: str
-    density_kg_m3: float
-    heat_capacity_j_kg_k: float
-    conductivity_w_m_k: float
+    density_kg_m3: Curve
+    heat_capacity_j_kg_k: Curve
+    conductivity_w_m_k: Curve
     latent_heat_j_kg: float = 0.0
     solidus_k: float = math.inf
     """Infinite for what does not melt."""
     liquidus_k: float = math.inf
+    solid_fraction: tuple[tuple[float, float], ...] = ()
+    """Temperatures (K) from solidus to liquidus and what is solid at each; what is liquid at the
+    solidus freezes there. Empty for a straight line."""
 
     def __post_init__(self) -> None:
-        for key in ("density_kg_m3", "heat_capacity_j_kg_k", "conductivity_w_m_k"):
-            value = getattr(self, key)
-            if not (value > 0.0 and math.isfinite(value)):
-                raise ValueError(f"{self.name}: {key} is {value}; it must be finite and above 0")
+        for key in PROPERTIES:
+            if fault := curve_fault(getattr(self, key)):
+                raise ValueError(f"{self.name}: {key} is {getattr(self, key)}; valid is {fault}")
         if not (self.latent_heat_j_kg >= 0.0 and math.isfinite(self.latent_heat_j_kg)):
             raise ValueError(
                 f"{self.name}: latent_heat_j_kg is {self.latent_heat_j_kg}; it must be finite and "
@@ -58,9 +77,45 @@ class ThermalMaterial:
         return math.isfinite(self.solidus_k)
 
     @property
+    def is_plain(self) -> bool:
+        """Whether heat is a straight line over temperature but for a straight freezing range."""
+        of_heat = (self.density_kg_m3, self.heat_capacity_j_kg_k)
+        return not (self.solid_fraction or any(isinstance(curve, tuple) for curve in of_heat))
+
+    @property
     def capacity_j_m3_k(self) -> float:
-        """Heat capacity of a volume."""
-        return self.density_kg_m3 * self.heat_capacity_j_kg_k
+        """Least heat capacity of a volume, without latent heat: it limits the steps."""
+        return float(self.capacities_j_m3_k(self.corners_k(0.0, 1.0)).min())
+
+    def capacities_j_m3_k(self, temperature_k: Floats) -> Floats:
+        """Heat capacity of a volume at temperatures, (n,) float64, J/m3/K."""
+        density = along(self.density_kg_m3, temperature_k)
+        return density * along(self.heat_capacity_j_kg_k, temperature_k)
+
+    def corners_k(self, low_k: float, high_k: float) -> Floats:
+        """Two temperatures and all between which properties are not straight, (n,) float64, K."""
+        curves = [getattr(self, key) for key in PROPERTIES] + [self.solid_fraction]
+        bends = [t for curve in curves if isinstance(curve, tuple) for t, _ in curve]
+        return np.unique([low_k, high_k, *bends])
+
+    def solid(self, temperature_k: Floats) -> Floats:
+        """What is solid between solidus and liquidus, (n,) float64."""
+        line = ((self.solidus_k, 1.0), (self.liquidus_k, 0.0))
+        return along(self.solid_fraction or line, temperature_k)
+
+
+def thermal(it: MouldMaterial) -> ThermalMaterial:
+    """A material as the solver takes it."""
+    density, conductivity = it.density_kg_m3, it.conductivity_w_m_k
+    if it.packing is not None:
+        density, conductivity = it.packing * QUARTZ_KG_M3, packed_w_m_k(it.packing)
+    plain = ThermalMaterial(it.name, density, it.heat_capacity_j_kg_k, conductivity)
+    if not isinstance(it, Metal):
+        return plain
+    return replace(
+        plain, latent_heat_j_kg=it.latent_heat_j_kg, solidus_k=it.solidus_k,
+        liquidus_k=it.liquidus_k, solid_fraction=it.solid,
+    )  # fmt: skip
 
 
 @dataclass(frozen=True)
@@ -70,7 +125,9 @@ class EnthalpyTable:
     reference_k: float
     """Where the enthalpy is 0."""
     rows: Floats
-    """(m, 5) float64: J/m3/K; enthalpies of solidus and liquidus, J/m3; solidus and liquidus, K."""
+    """(m, 5) float64: J/m3/K; enthalpies of solidus and liquidus, J/m3; solidus and liquidus, K.
+    Where a material has curves rows go on: enthalpy at the first of the nodes, J/m3; nodes for
+    a J/m3, 0 for a material without curves; temperature at each node, K."""
 
     def enthalpy_j_m3(self, temperature_k: Floats, material: Ints) -> Floats:
         """Enthalpy of elements; one on an isothermal front (solidus = liquidus) is liquid.
@@ -84,7 +141,7 @@ class EnthalpyTable:
         -------
         (n,) float64, J/m3
         """
-        capacity, solid, liquid, solidus, liquidus = self.rows[material].T
+        capacity, solid, liquid, solidus, liquidus = self.rows[material, :5].T
         below = capacity * (temperature_k - self.reference_k)
         melting = np.isfinite(solidus) & (temperature_k >= solidus)
         liquids = np.isfinite(solidus) & (temperature_k >= liquidus)
@@ -92,14 +149,23 @@ class EnthalpyTable:
             share = (temperature_k - solidus) / (liquidus - solidus)
             mushy = solid + share * (liquid - solid)
             above = liquid + capacity * (temperature_k - liquidus)
-        return np.where(liquids, above, np.where(melting, mushy, below))
+        found = np.where(liquids, above, np.where(melting, mushy, below))
+        for m in np.unique(material):
+            if self.rows.shape[1] > 5 and (density := self.rows[m, 6]) > 0.0:
+                heat = self.rows[m, 5] + np.arange(NODES) / density
+                found[material == m] = np.interp(
+                    temperature_k[material == m], self.rows[m, 7:], heat
+                )
+        return found
 
     def temperature_k(self, enthalpy_j_m3: Floats, material: Ints) -> Floats:
         """Temperature of elements, (n,) float64, K; the inverse of ``enthalpy_j_m3``."""
         return np.asarray(_temperatures(enthalpy_j_m3, material, self.rows, self.reference_k))
 
 
-def enthalpy_table(materials: Sequence[ThermalMaterial], reference_k: float) -> EnthalpyTable:
+def enthalpy_table(
+    materials: Sequence[ThermalMaterial], reference_k: float, hottest_k: float = 0.0
+) -> EnthalpyTable:
     """Tabulate materials.
 
     Parameters
@@ -108,20 +174,72 @@ def enthalpy_table(materials: Sequence[ThermalMaterial], reference_k: float) -> 
     reference_k : float, K
         Where the enthalpy is 0: the coldest initial temperature, so that drift is counted against
         the heat that is there to be lost.
+    hottest_k : float, K
+        To where curves are tabulated.
     """
-    rows = []
-    for it in materials:
-        capacity = it.capacity_j_m3_k
-        solid = capacity * (it.solidus_k - reference_k)
-        mushy_k = it.liquidus_k - it.solidus_k if it.melts else 0.0
-        liquid = solid + capacity * mushy_k + it.density_kg_m3 * it.latent_heat_j_kg
-        rows.append((capacity, solid, liquid, it.solidus_k, it.liquidus_k))
-    return EnthalpyTable(reference_k, np.array(rows, dtype=np.float64))
+    plain = all(it.is_plain for it in materials)
+    rows = np.zeros((len(materials), 5 if plain else 7 + NODES))
+    for row, it in zip(rows, materials, strict=True):
+        if it.is_plain:
+            row[:5] = _line(it, reference_k)
+        else:
+            row[:] = _curves(it, reference_k, max(hottest_k, it.liquidus_k if it.melts else 0.0))
+    return EnthalpyTable(reference_k, rows)
+
+
+def _line(it: ThermalMaterial, reference_k: float) -> tuple[float, ...]:
+    capacity = it.capacity_j_m3_k
+    solid = capacity * (it.solidus_k - reference_k)
+    mushy_k = it.liquidus_k - it.solidus_k if it.melts else 0.0
+    density = ends(it.density_kg_m3)[0]
+    liquid = solid + capacity * mushy_k + density * it.latent_heat_j_kg
+    return capacity, solid, liquid, it.solidus_k, it.liquidus_k
+
+
+def _integral(values: Floats, over: Floats) -> Floats:
+    """Integral from the first of some places to each, of straight lines between them."""
+    parts = 0.5 * (values[1:] + values[:-1]) * np.diff(over)
+    return np.concatenate([[0.0], np.cumsum(parts)])
+
+
+def _curves(it: ThermalMaterial, reference_k: float, hottest_k: float) -> Floats:
+    """Row of a material with curves."""
+    beyond = 0.1 * max(hottest_k - reference_k, 10.0)
+    low_k, high_k = max(reference_k - beyond, 1.0), hottest_k + beyond
+    place = np.union1d(it.corners_k(low_k, high_k), np.linspace(low_k, high_k, NODES))
+    place = place[(place >= low_k) & (place <= high_k)]
+    solid = np.ones(len(place))
+    if it.melts:
+        # at the solidus twice: what is left freezes there
+        place = np.sort(np.append(place[place != it.solidus_k], [it.solidus_k] * 2))
+        solid = np.where(place > it.solidus_k, it.solid(place), 1.0)
+        solid[np.searchsorted(place, it.solidus_k) + 1] = it.solid(np.array([it.solidus_k]))[0]
+        if it.solidus_k == it.liquidus_k:
+            solid[place > it.solidus_k] = 0.0
+            solid[np.searchsorted(place, it.solidus_k) + 1] = 0.0
+    heat = _integral(it.capacities_j_m3_k(place), place)
+    melted_kg_m3 = _integral(along(it.density_kg_m3, place), 1.0 - solid)
+    heat += it.latent_heat_j_kg * melted_kg_m3
+    heat -= np.interp(reference_k, place, heat)
+    solidus, liquidus = math.inf, math.inf
+    if it.melts:
+        solidus = heat[np.searchsorted(place, it.solidus_k)]
+        liquidus = heat[np.searchsorted(place, it.liquidus_k, side="right") - 1]
+    least = it.capacities_j_m3_k(place).min()
+    nodes = np.linspace(heat[0], heat[-1], NODES)
+    per_node = (NODES - 1) / (heat[-1] - heat[0])
+    head = [least, solidus, liquidus, it.solidus_k, it.liquidus_k, heat[0], per_node]
+    return np.concatenate([head, np.interp(nodes, heat, place)])
 
 
 @njit(inline="always")
 def temperature_of(enthalpy: float, m: int, rows: Any, reference: float) -> Any:
     """Temperature (K) of an enthalpy (J/m3) of material m; compiled code takes it in."""
+    if rows.shape[1] > 5 and rows[m, 6] > 0.0:
+        place = (enthalpy - rows[m, 5]) * rows[m, 6]
+        node = int(min(max(place, 0.0), rows.shape[1] - 9.0))
+        low = rows[m, 7 + node]
+        return low + (place - node) * (rows[m, 8 + node] - low)
     if enthalpy < rows[m, 1]:
         return reference + enthalpy / rows[m, 0]
     if enthalpy < rows[m, 2]:

@@ -45,9 +45,11 @@ class HeatMethod:
         ValueError
             When the sizes do not suit the exchange, or it is that of a plain grid.
         """
-        conductivity, resistance = filling.conductivity_w_m_k, filling.resistance_m2k_w
+        conductivity, resistance = filling.conductivity_w_m_k, filling.least_m2k_w
         if self.exchange == "faces":
-            return face_exchange(elements, conductivity, resistance)
+            return face_exchange(elements, conductivity, resistance, curves=filling.curves)
+        if filling.curves is not None:
+            raise ValueError("conductances that vary need an exchange over faces")
         if self.exchange == "power":
             return power_exchange(elements, conductivity, resistance)
         if self.exchange == "difference":
@@ -74,8 +76,10 @@ class HeatMethod:
         if self.exchange == "difference":
             if len(elements.size_m) != raster.material.size:
                 raise ValueError("finite differences need elements of one size: no layers")
+            if filling.curves is not None:
+                raise ValueError("conductances that vary need an exchange over faces")
             return DifferenceSteps(
-                raster, filling.table, filling.conductivity_w_m_k, filling.resistance_m2k_w,
+                raster, filling.table, filling.conductivity_w_m_k, filling.least_m2k_w,
                 self.step_share, self.threads,
             )  # fmt: skip
         return self.stepping_of(elements, filling)

@@ -13,7 +13,7 @@ from scipy.spatial import ConvexHull
 
 from sandmould.arrays import Floats, Ints
 from sandmould.casting.arpm.elements import Elements
-from sandmould.casting.arpm.exchange import Exchange, check_resistance
+from sandmould.casting.arpm.exchange import Exchange, resistances
 from sandmould.casting.arpm.faces import over_faces
 from sandmould.casting.arpm.kernel import with_images
 
@@ -21,8 +21,9 @@ REACH = 3.0
 """Sizes within which images stand behind the walls."""
 
 
-def power_exchange(elements: Elements, conductivity_w_m_k: Floats, resistance_m2k_w: float
-                   ) -> Exchange:  # fmt: skip
+def power_exchange(
+    elements: Elements, conductivity_w_m_k: Floats, resistance_m2k_w: float | Floats
+) -> Exchange:
     """Rates over the faces of a power diagram with weights (r0/2)^2.
 
     Parameters
@@ -30,7 +31,7 @@ def power_exchange(elements: Elements, conductivity_w_m_k: Floats, resistance_m2
     elements : Elements
         Of 2D, at any positions in their box; its walls are insulated.
     conductivity_w_m_k : (m,) float64, W/m/K
-    resistance_m2k_w : float, m2 K/W
+    resistance_m2k_w : float or (m, m) float64, m2 K/W
 
     Returns
     -------
@@ -42,7 +43,7 @@ def power_exchange(elements: Elements, conductivity_w_m_k: Floats, resistance_m2
     ValueError
         When the elements are in 3D, or one has no cell because a larger one covers it.
     """
-    check_resistance(resistance_m2k_w)
+    between = resistances(resistance_m2k_w, len(conductivity_w_m_k))
     if elements.dimensions != 2:
         raise ValueError("elements at free positions are in 3D; power diagrams are drawn in 2D")
     first, second, length, near_m, distance = _edges(elements)
@@ -60,7 +61,7 @@ def power_exchange(elements: Elements, conductivity_w_m_k: Floats, resistance_m2
     near_m, far_m = near_m[real], (distance - near_m)[real]
     material, other = elements.material[first], elements.material[second]
     path = near_m / conductivity_w_m_k[material] + far_m / conductivity_w_m_k[other]
-    path += np.where(material != other, resistance_m2k_w, 0.0)
+    path += between[material, other]
     once = first < second
     return over_faces(first[once], second[once], np.asarray(length / path)[once], volume)
 

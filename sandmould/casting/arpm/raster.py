@@ -4,14 +4,29 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
 
 from sandmould.arrays import Flags, Floats, Ints
 from sandmould.scenario.casting.shapes import Body, held_by
 
-MOULD = 0
-"""Material of all that is not painted."""
+MOULD, CASTING = 0, 1
+"""Materials of all that is not painted, and of what is poured; others are inserts and air."""
+
+
+class BesideFaces(NamedTuple):
+    """What passes heat beside a surface other than whole faces."""
+
+    low: Ints
+    """(f,) int64: cells on the low side of faces within a material."""
+    axis: Ints
+    share: Floats
+    """(f,) float64: of each face that lies in the material."""
+    link: Ints
+    """(2, l) int64: cells of a material that do not touch in it."""
+    link_share: Floats
+    """(l,) float64: over what a whole face between two cells passes."""
 
 
 @dataclass(frozen=True)
@@ -30,6 +45,8 @@ class Cut:
     """(f,) float64: the drawn surface's area there over a full face's."""
     low_part: Floats
     """(f,) float64: of the line between the two centres, what lies in the low cell's material."""
+    passage: BesideFaces
+    """How heat passes along the surface."""
 
 
 @dataclass(frozen=True)
@@ -74,6 +91,9 @@ class Raster:
 def painted(low_m: Floats, high_m: Floats, cell_m: float, solids: Mapping[int, Body]) -> Raster:
     """Paint solids into a box of mould; a cell is a solid's where its centre is inside.
 
+    Where solids overlap, the last one has the place. A side of the box that is no multiple of the
+    cells grows to the next one: at its high end, or at the low one where a solid touches the high.
+
     Parameters
     ----------
     low_m, high_m : (d,) float64, m
@@ -85,14 +105,23 @@ def painted(low_m: Floats, high_m: Floats, cell_m: float, solids: Mapping[int, B
     Raises
     ------
     ValueError
-        When the box is no multiple of the cells, two solids overlap, or a solid holds no cell.
+        When a solid touches both ends of a side that is no multiple of the cells, or holds no cell.
     """
-    cells = np.round((high_m - low_m) / cell_m).astype(np.int64)
-    if (cells < 1).any() or not np.allclose(cells * cell_m, high_m - low_m, rtol=1e-9):
+    size_m = high_m - low_m
+    cells = np.round(size_m / cell_m).astype(np.int64)
+    off = ~np.isclose(cells * cell_m, size_m, rtol=1e-9)
+    cells[off] = np.ceil(size_m[off] / cell_m)
+    ends_m = np.concatenate(
+        [solid.corners() for solid in solids.values()] or [0.5 * (low_m + high_m)[None]]
+    )
+    near = 1e-6 * size_m
+    low_met, high_met = ends_m.min(axis=0) < low_m + near, ends_m.max(axis=0) > high_m - near
+    if (off & low_met & high_met).any():
         raise ValueError(
-            f"the box measures {(high_m - low_m).tolist()} m; each side must be a multiple of "
-            f"cell_m = {cell_m}"
+            f"the box measures {size_m.tolist()} m; a side that the casting fills must be a "
+            f"multiple of cell_m = {cell_m}"
         )
+    low_m = np.where(off & high_met, high_m - cells * cell_m, low_m)
     raster = Raster(np.zeros(cells, dtype=np.int64), cell_m, low_m)
     centre, flat = raster.centre_m, raster.material.reshape(-1)
     for material, solid in solids.items():
@@ -101,12 +130,6 @@ def painted(low_m: Floats, high_m: Floats, cell_m: float, solids: Mapping[int, B
         inside = inside_solid(solid, centre)
         if not inside.any():
             raise ValueError(f"{solid.name} holds no cell of {cell_m} m; it must lie in the box")
-        if (taken := inside & (flat != MOULD)).any():
-            place = centre[taken][0].tolist()
-            raise ValueError(
-                f"{solid.name} overlaps material {flat[taken][0]} at {place} m; solids must be "
-                "apart"
-            )
         flat[inside] = material
     return raster
 

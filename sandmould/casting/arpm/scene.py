@@ -3,9 +3,8 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
-from dataclasses import replace
 from functools import lru_cache
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -16,14 +15,17 @@ from sandmould.casting.arpm.estimates import Cooled, cooled, freezes_s
 from sandmould.casting.arpm.filling import Filling, check_casting
 from sandmould.casting.arpm.kernel import check_sizes
 from sandmould.casting.arpm.marching import STEP_SHARE
-from sandmould.casting.arpm.material import ThermalMaterial
+from sandmould.casting.arpm.material import ThermalMaterial, thermal
 from sandmould.casting.arpm.method import HeatMethod
-from sandmould.casting.arpm.raster import Raster, painted
+from sandmould.casting.arpm.raster import CASTING, MOULD, Raster, painted
+from sandmould.casting.arpm.varying import Transfer
 from sandmould.scenario.casting.shapes import Body, Rectangle, solid_of
 from sandmould.scenario.casting.solidification import Solidification
+from sandmould.scenario.solids import SolidMesh, unit_hint
 
+AIR = ThermalMaterial("air", 1e9, 1e6, 1e6)
+"""Stands for air that stays as it is: a layer of elements outside of the box."""
 KERNEL_FORMS = ("printed", "corrected", "symmetric")
-CASTING = 1
 
 
 def series_columns(scenario: Solidification) -> tuple[str, str, str]:
@@ -43,58 +45,79 @@ def solids_of(scenario: Solidification) -> list[Body]:
     return [solid_of(shape, f"shapes.{i}") for i, shape in enumerate(scenario.shapes)]
 
 
-@lru_cache(maxsize=8)
-def _raster(box: Rectangle, shapes: tuple[Any, ...], element_m: float) -> Raster:
-    solids = {n: solid_of(shape, f"shapes.{n - 1}") for n, shape in enumerate(shapes, start=1)}
-    parts = painted(np.array(box.low_m), np.array(box.high_m), element_m, solids)
-    # parts that touch are one casting: nothing resists the heat between them
-    return replace(parts, material=np.minimum(parts.material, CASTING))
+class _Drawing(NamedTuple):
+    """What of a scenario makes its cells."""
+
+    box: Rectangle
+    shapes: tuple[Any, ...]
+    inserts: tuple[Any, ...]
+    sides: tuple[str, ...]
+    """Those that air cools."""
+    element_m: float
+
+
+def _drawing(scenario: Solidification) -> _Drawing:
+    inserts = tuple(it.shape for it in scenario.inserts)
+    sides = scenario.air.sides if scenario.air else ()
+    return _Drawing(scenario.box, scenario.shapes, inserts, sides, scenario.element_m)
 
 
 @lru_cache(maxsize=8)
-def _drawn(box: Rectangle, shapes: tuple[Any, ...], element_m: float) -> Raster:
-    solids = [solid_of(shape, f"shapes.{i}") for i, shape in enumerate(shapes)]
-    return with_cut(_raster(box, shapes, element_m), solids)
+def _raster(drawing: _Drawing) -> Raster:
+    box, shapes, inserts, sides, element_m = drawing
+    # parts that touch or overlap are one casting, which lies in all else
+    bodies = [solid_of(shape, f"inserts.{n}.shape") for n, shape in enumerate(inserts)]
+    bodies += [solid_of(shape, f"shapes.{n}") for n, shape in enumerate(shapes)]
+    number = [MOULD, *range(CASTING + 1, CASTING + 1 + len(inserts)), *[CASTING] * len(shapes)]
+    raster = painted(
+        np.array(box.low_m), np.array(box.high_m), element_m, dict(enumerate(bodies, start=1))
+    )
+    axes = "xyz"[: len(box.low_m)]
+    beside = np.array([[f"{end}_{axis}" in sides for end in ("low", "high")] for axis in axes])
+    air = CASTING + 1 + len(inserts)
+    material = np.pad(np.array(number)[raster.material], beside.astype(int), constant_values=air)
+    return Raster(material, element_m, raster.low_m - element_m * beside[:, 0])
 
 
 @lru_cache(maxsize=8)
-def _elements(
-    box: Rectangle, shapes: tuple[Any, ...], element_m: float, layers: tuple[int, ...]
-) -> Elements:
-    return placed(_raster(box, shapes, element_m), layers)
+def _drawn(drawing: _Drawing) -> Raster:
+    solids = [solid_of(shape, f"shapes.{i}") for i, shape in enumerate(drawing.shapes)]
+    return with_cut(_raster(drawing), solids)
 
 
 @lru_cache(maxsize=8)
-def _size_fault(
-    box: Rectangle, shapes: tuple[Any, ...], element_m: float, layers: tuple[int, ...],
-    kernel_size: float,
-) -> str:  # fmt: skip
+def _elements(drawing: _Drawing, layers: tuple[int, ...]) -> Elements:
+    return placed(_raster(drawing), layers)
+
+
+@lru_cache(maxsize=8)
+def _size_fault(drawing: _Drawing, layers: tuple[int, ...], kernel_size: float) -> str:
     """Why a kernel refuses these sizes of elements; nothing where it takes them."""
     try:
-        check_sizes(_elements(box, shapes, element_m, layers), kernel_size)
+        check_sizes(_elements(drawing, layers), kernel_size)
     except ValueError as error:
         return str(error)
     return ""
 
 
 @lru_cache(maxsize=8)
-def _cooled(box: Rectangle, shapes: tuple[Any, ...], element_m: float) -> Cooled:
-    return cooled(_drawn(box, shapes, element_m))
+def _cooled(drawing: _Drawing) -> Cooled:
+    return cooled(_drawn(drawing), len(drawing.inserts))
 
 
 def cooled_of(scenario: Solidification) -> Cooled:
     """The casting as its sand sees it; ValueErrors are those of ``painted``."""
-    return _cooled(scenario.box, scenario.shapes, scenario.element_m)
+    return _cooled(_drawing(scenario))
 
 
 def raster_of(scenario: Solidification) -> Raster:
     """Cells of the smallest size, 0 for the mould; ValueErrors are those of ``painted``."""
-    return _raster(scenario.box, scenario.shapes, scenario.element_m)
+    return _raster(_drawing(scenario))
 
 
 def elements_of(scenario: Solidification) -> Elements:
     """Elements of a scenario; ValueErrors are those of ``painted``."""
-    return _elements(scenario.box, scenario.shapes, scenario.element_m, scenario.layers)
+    return _elements(_drawing(scenario), scenario.layers)
 
 
 def drawn_raster(scenario: Solidification) -> Raster:
@@ -103,16 +126,30 @@ def drawn_raster(scenario: Solidification) -> Raster:
     Kernels know no faces: theirs are the painted cells.
     """
     raster_as = _raster if scenario.exchange in KERNEL_FORMS else _drawn
-    return raster_as(scenario.box, scenario.shapes, scenario.element_m)
+    return raster_as(_drawing(scenario))
 
 
 def filling_of(scenario: Solidification) -> Filling:
-    """Materials: the mould, then the metal."""
-    mould = ThermalMaterial(**scenario.mould.model_dump())
-    metal = ThermalMaterial(**scenario.casting.model_dump())
-    transfer = scenario.heat_transfer_w_m2_k
-    initial_k = (scenario.initial_k.mould, scenario.initial_k.casting)
-    return Filling((mould, metal), initial_k, 1.0 / transfer if transfer else 0.0)
+    """Materials: the mould, the metal, inserts, and air."""
+    metal, air = thermal(scenario.casting), scenario.air
+    materials = [thermal(scenario.mould), metal, *map(thermal, scenario.inserts)]
+    start = scenario.initial_k
+    initial_k = [start.mould, start.casting, *(it.initial_k or start.mould
+                                               for it in scenario.inserts)]  # fmt: skip
+    over_time = scenario.heat_transfer_over == "time"
+    to_mould = scenario.heat_transfer_w_m2_k
+    passes = [to_mould, *(it.heat_transfer_w_m2_k or to_mould for it in scenario.inserts)]
+    pairs = [(MOULD, CASTING), *((CASTING, n) for n in range(CASTING + 1, len(materials)))]
+    transfers = {
+        pair: Transfer(h, over_time, scenario.coating_m2k_w)
+        for pair, h in zip(pairs, passes, strict=True)
+    }
+    if air is not None:
+        transfers |= {(n, len(materials)): Transfer(air.heat_transfer_w_m2_k)
+                      for n in range(len(materials))}  # fmt: skip
+        materials.append(AIR)
+        initial_k.append(air.temperature_k)
+    return Filling(tuple(materials), tuple(initial_k), transfers=transfers)
 
 
 def method_of(scenario: Solidification) -> HeatMethod:
@@ -133,10 +170,21 @@ def _misfits(scenario: Solidification) -> Iterator[Problem]:
     if scenario.initial_k.mould >= solidus_k:
         valid = f"below the solidus of {scenario.casting.name}, {solidus_k:g} K"
         yield Problem("initial_k.mould", scenario.initial_k.mould, valid)
+    for i, it in enumerate(scenario.inserts):
+        if (it.initial_k or 0.0) >= solidus_k:
+            valid = f"below the solidus of {scenario.casting.name}, {solidus_k:g} K"
+            yield Problem(f"inserts.{i}.initial_k", it.initial_k, valid)
+    axes = "xyz"[: scenario.dimensions]
+    if scenario.air and (far := [side for side in scenario.air.sides if side[-1] not in axes]):
+        yield Problem("air.sides", far, f"sides along {' and '.join(axes)}, as the box has them")
     if scenario.exchange == "difference" and scenario.layers:
         valid = "empty with exchange difference: its cells have one size"
         yield Problem("layers", list(scenario.layers), valid)
-    if scenario.exchange in KERNEL_FORMS and scenario.heat_transfer_w_m2_k:
+    filling, exchange = filling_of(scenario), scenario.exchange
+    if exchange != "faces" and filling.curves is not None:
+        valid = "faces, where a conductivity or heat transfer has a curve"
+        yield Problem("exchange", exchange, valid)
+    elif exchange in KERNEL_FORMS and filling.least_m2k_w.any():
         valid = (
             "faces or difference where heat_transfer_w_m2_k resists the heat: kernels do not see "
             "the surface on which it acts"
@@ -155,18 +203,23 @@ def _places(scenario: Solidification) -> Iterator[Problem]:
     """Shapes and probes that are not in the box, or of another dimension."""
     low_m, high_m = np.array(scenario.box.low_m), np.array(scenario.box.high_m)
     room = f"the box from {low_m.tolist()} to {high_m.tolist()} m"
-    for i, shape in enumerate(scenario.shapes):
+    bodies = {f"shapes.{i}": shape for i, shape in enumerate(scenario.shapes)}
+    bodies |= {f"inserts.{i}.shape": it.shape for i, it in enumerate(scenario.inserts)}
+    for key, shape in bodies.items():
         try:
-            corners = solid_of(shape, f"shapes.{i}").corners()
+            corners = solid_of(shape, key).corners()
         except BadInputError as error:
             yield from error.problems
             continue
         if corners.shape[1] != scenario.dimensions:
             valid = f"a shape of {scenario.dimensions}D as the box is"
-            yield Problem(f"shapes.{i}.kind", shape.kind, valid)
+            yield Problem(f"{key}.kind", shape.kind, valid)
         elif (corners < low_m).any() or (corners > high_m).any():
             reach = [corners.min(axis=0).tolist(), corners.max(axis=0).tolist()]
-            yield Problem(f"shapes.{i}", reach, f"a {shape.kind} inside {room}")
+            hint = ""
+            if isinstance(shape, SolidMesh):
+                hint = unit_hint(shape, np.ptp(corners, axis=0), high_m - low_m)
+            yield Problem(key, reach, f"a {shape.kind} inside {room}{hint}")
     for i, probe in enumerate(scenario.probes):
         place = np.array(probe.at_m)
         if len(place) != scenario.dimensions or (place < low_m).any() or (place > high_m).any():
@@ -186,8 +239,7 @@ def _layout_problems(scenario: Solidification) -> Iterator[Problem]:
 def _ratio(scenario: Solidification) -> Iterator[Problem]:
     """Sizes of elements that a kernel's rule forbids."""
     if scenario.exchange in KERNEL_FORMS and scenario.layers:
-        it = scenario
-        fault = _size_fault(it.box, it.shapes, it.element_m, it.layers, it.kernel_size)
+        fault = _size_fault(_drawing(scenario), scenario.layers, scenario.kernel_size)
         if fault:
             valid = f"layers whose sizes keep the rule of 1/c_k ({fault})"
             yield Problem("layers", list(scenario.layers), valid)
@@ -216,7 +268,7 @@ def held_volume_m3(scenario: Solidification) -> float:
 def expected_element_steps(scenario: Solidification) -> float:
     """Estimate the element-steps of a run, by the step that each element alone could take."""
     elements, filling = elements_of(scenario), filling_of(scenario)
-    capacity = np.array([it.capacity_j_m3_k for it in filling.materials])
+    capacity = filling.table.rows[:, 0]
     spread = (capacity / filling.conductivity_w_m_k)[elements.material]
     limit_s = STEP_SHARE * spread * elements.size_m**2 / (2 * elements.dimensions)
     limit_s = np.minimum(limit_s, scenario.record_s)  # steps end at records

@@ -13,12 +13,9 @@ from scipy.sparse import csr_array
 
 from sandmould.arrays import Floats
 from sandmould.casting.arpm.elements import Elements
-from sandmould.casting.arpm.filling import Filling, check_casting
+from sandmould.casting.arpm.filling import OUTSIDE, Filling, check_casting
 from sandmould.casting.arpm.marching import Heat, Marching
 from sandmould.casting.arpm.probes import probe_weights
-
-OUTSIDE = 0.05
-"""Of the range of initial temperatures: farther out no stable step leads."""
 
 
 class UnstableError(RuntimeError):

@@ -162,5 +162,7 @@ def _super_steps(
             if begin[i] >= solid > last[i]:
                 share = (begin[i] - solid) / (begin[i] - last[i])
                 frozen[i] = time_s + (step + share) * dt
+            elif last[i] >= solid > begin[i]:
+                frozen[i] = np.nan
         begin, last = last, begin
     return begin

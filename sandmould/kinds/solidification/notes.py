@@ -44,6 +44,7 @@ def notes(scenario: Solidification) -> tuple[Note, ...]:
         least_sand_m3=heat_to_lose_j_m3(scenario) * it.volume_m3 / sand_takes_j_m3(scenario),
         times_s=_times_s(scenario, it) if share < 1.0 else None,
         sides=_sides(scenario),
+        box_m=_box_m(scenario),
         fewest=FEWEST_ELEMENTS,
         wall=_thin_wall(scenario.shapes, FEWEST_ELEMENTS * scenario.element_m * (1.0 - 1e-6)),
         drawn=drawn,
@@ -65,13 +66,25 @@ def _times_s(scenario: Solidification, it: Cooled) -> tuple[float, float] | None
 
 def _sides(scenario: Solidification) -> list[str]:
     """Sides of the box that the casting touches."""
-    material = scene.raster_of(scenario).material
+    casting = scene.raster_of(scenario).material == scene.CASTING
     return [
         f"{end} {'xyz'[axis]}"
-        for axis in range(material.ndim)
+        for axis in range(casting.ndim)
         for end, at in (("low", 0), ("high", -1))
-        if material.take(at, axis=axis).any()
+        if casting.take(at, axis=axis).any()
     ]
+
+
+def _box_m(scenario: Solidification) -> list[float] | None:
+    """Sides of the box as whole elements fill it; None where they are those that were given."""
+    elements, given_m = (
+        scene.elements_of(scenario),
+        np.subtract(scenario.box.high_m, scenario.box.low_m),
+    )
+    sides = scenario.air.sides if scenario.air else ()
+    layers = [sum(side.endswith(axis) for side in sides) for axis in "xyz"[: len(given_m)]]
+    box_m = elements.high_m - elements.low_m - scenario.element_m * np.array(layers)
+    return None if np.allclose(box_m, given_m, rtol=1e-9) else box_m.tolist()
 
 
 @lru_cache(maxsize=8)

@@ -29,7 +29,7 @@ from sandmould.kinds.kind import Kind
 from sandmould.kinds.registry import DEFAULT_KIND, KINDS, kind_named
 from sandmould.scenario.quantity import NAME, units_at
 from sandmould.scenario.reading import Origin, Tree, merge, read_yaml, validated
-from sandmould.scenario.units import in_unit
+from sandmould.scenario.units import in_unit, unit_of
 
 STUDIES = (SHIPPED / "config" / "studies", SHIPPED / "config" / "scenarios")
 CALIBRATED = Path("results") / "materials"
@@ -267,7 +267,7 @@ def _wrong_units(model: type[BaseModel], file: StudyFile) -> list[Problem]:
     problems = []
     for key, value, unit in _units(file.tree):
         declared = _declared_units(model, key)
-        if declared and str(unit) not in declared:
+        if declared and unit_of(str(unit)) not in declared:
             valid = f"the unit of the key, {' or '.join(declared)}"
             valid += f": {told}" if (told := in_unit(value, unit, declared)) else ""
             problems.append(Problem(f"{key}.unit", unit, valid, file.name))

@@ -81,17 +81,22 @@ def test_elements_that_fill_no_box() -> None:
         faces_of(gap)
 
 
-def test_solids_are_painted_and_overlaps_refused() -> None:
+def test_solids_are_painted_and_boxes_rounded() -> None:
     low, high = np.zeros(2), np.full(2, 1.0)
     raster = painted(low, high, 0.1, {1: square("block", 0.2, 0.5), 2: square("chill", 0.5, 0.8)})
     assert (raster.material == 1).sum() == 9
     assert (raster.material == 2).sum() == 9
-    with pytest.raises(ValueError, match="chill overlaps material 1"):
-        painted(low, high, 0.1, {1: square("block", 0.2, 0.5), 2: square("chill", 0.4, 0.8)})
+    # the last one has the place of both
+    over = painted(low, high, 0.1, {1: square("block", 0.2, 0.5), 2: square("chill", 0.4, 0.8)})
+    assert over.material[4, 4] == 2
     with pytest.raises(ValueError, match="holds no cell"):
         painted(low, high, 0.1, {1: square("block", 1.2, 1.5)})
     with pytest.raises(ValueError, match="must be a multiple"):
-        painted(low, high, 0.3, {1: square("block", 0.2, 0.5)})
+        painted(low, high, 0.3, {1: square("block", 0.0, 1.0)})
+    for place, low_m in ((0.0, 0.0), (0.3, 0.0), (0.7, -0.2)):
+        rounded = painted(low, high, 0.3, {1: square("block", place, place + 0.3)})
+        assert rounded.material.shape == (4, 4)
+        np.testing.assert_allclose(rounded.low_m, low_m)
     with pytest.raises(ValueError, match="the mould's"):
         painted(low, high, 0.1, {0: square("block", 0.2, 0.5)})
 

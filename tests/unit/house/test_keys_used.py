@@ -14,6 +14,7 @@ from pydantic import BaseModel
 from sandmould import ROOT
 from sandmould.definition.sweep import Range, Sweep
 from sandmould.kinds.registry import KINDS
+from sandmould.scenario.casting.solidification import Air
 from sandmould.scenario.own_deck import Taken
 from sandmould.scenario.quantity import PLANNED, Section, models_in, quantity
 from sandmould.scenario.yaml_text import load_users
@@ -36,6 +37,23 @@ PHYSICS = {
     "Loop.mass_scale": "tests/verification/test_coupling_monolithic.py",
     "Loop.damping_ratio": "tests/verification/test_coupling_monolithic.py",
     **{f"Taken.{key}": "tests/workflow/test_deck_run.py" for key in Taken.model_fields},
+    **dict.fromkeys(
+        (
+            "MetalAndMould.coating_m2k_w",
+            "MetalAndMould.heat_transfer_over",
+            "Metal.partition",
+            "MouldMaterial.packing",
+            "Metal.pure_melts_at_k",
+            "Metal.solid_fraction",
+            "Solidification.inserts",
+            "Solidification.air",
+            "Insert.shape",
+            "Insert.initial_k",
+            "Insert.heat_transfer_w_m2_k",
+            *(f"Air.{key}" for key in Air.model_fields),
+        ),
+        "tests/verification/test_arpm_curves.py",
+    ),
     "PatternConfig.crush_strength_pa": "tests/unit/kinds/test_sand_bending.py",
     "PatternConfig.tolerance_m": "tests/unit/kinds/test_sand_bending.py",
     "PatternConfig.depth_m": "tests/unit/pattern_fe/test_pattern_scene.py",

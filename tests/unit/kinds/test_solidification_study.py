@@ -54,7 +54,6 @@ BAR = SMALL["shapes"][0]
 @pytest.mark.parametrize(
     ("scenario", "told"),
     [
-        ({"shapes": [BAR, BAR]}, r"scenario.shapes = .* overlaps material 1 at"),
         ({"shapes": [BAR | {"high_m": [0.05, 0.09]}]}, r"shapes.0 = .* a rectangle inside the box"),
         (
             {"shapes": [{"kind": "rectangle", "low_m": [0, 0], "high_m": [0.08, 0.08]}]},
@@ -64,7 +63,36 @@ BAR = SMALL["shapes"][0]
             {"shapes": [BAR | {"high_m": [0.02, 0.06]}]},
             "a high_m with as many coordinates as low_m",
         ),
-        ({"element_m": 0.003}, r"shapes = .* multiple of cell_m = 0.003"),
+        (
+            {"shapes": [BAR | {"low_m": [0.0, 0.02], "high_m": [0.08, 0.06]}], "element_m": 0.003},
+            r"shapes = .* multiple of cell_m = 0.003",
+        ),
+        (
+            {"casting": {"solid_fraction": [[1713, 0.5], [1740, 0.7], [1773, 0.0]]}},
+            "a solid_fraction of fractions from at most 1 at the solidus that fall",
+        ),
+        (
+            {"casting": {"solid_fraction": "scheil"}},
+            "a partition, and a pure_melts_at_k above liquidus_k",
+        ),
+        (
+            {"heat_transfer_w_m2_k": [[300, 500], [1800, -5]]},
+            "_k = .* pairs with second numbers greater than 0",
+        ),
+        ({"mould": {"conductivity_w_m_k": []}}, "conductivity_w_m_k = .* two or more pairs"),
+        (
+            {"mould": {"conductivity_w_m_k": [[900, 0.5], [300, 0.4]]}},
+            "two or more pairs whose first numbers rise",
+        ),
+        (
+            {"exchange": "difference", "heat_transfer_w_m2_k": [[300, 500], [1800, 900]]},
+            "exchange = 'difference' .* faces, where a conductivity or heat transfer has a curve",
+        ),
+        (
+            {"air": {"sides": ["low_z"], "temperature_k": 293, "heat_transfer_w_m2_k": 10}},
+            r"air.sides = \['low_z'\] .* sides along x and y",
+        ),
+        ({"casting": {"solidus_k": "1440 C"}}, r"write \{value: 1440, unit: degC, source: ..."),
         (
             {"probes": [{"name": "far", "at_m": [0.1, 0.0]}]},
             r"scenario.probes.0.at_m = \[0.1, 0.0\] .* a point in the box",
@@ -106,7 +134,7 @@ def test_what_cannot_solidify_is_told_in_one_sentence(
     [
         ({"replicates": 2}, "replicates = 2 .* nothing in a run is drawn by lot"),
         ({"certificate": {"controls": ["hold"]}}, "valid is absent: only studies of sand"),
-        ({"material": "rojek_2004"}, "a material of kind solidification: hirata_2019"),
+        ({"material": "rojek_2004"}, "a material of kind solidification: .*, hirata_2019"),
         (
             {"sweep": {"keys": {"element_m": [0.01, 0.005]}}, "reference": {"element_m": 0.002}},
             "reference = .* a point of the sweep, such as {'element_m': 0.01}",

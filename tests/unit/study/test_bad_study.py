@@ -101,7 +101,8 @@ CASES: dict[str, tuple[str | bytes, str]] = {
     "material that no kind can use": (
         "based_on: plates\nmaterial: hirata_2019_aluminium",
         "trial.yaml: material = 'hirata_2019_aluminium' cannot be used: valid is the name of a "
-        "material of kind solidification: hirata_2019.",
+        "material of kind solidification: a356_iron_die, a356_silica, ductile_iron_olivine, "
+        "grey_iron_silica, gun_metal_zircon, hirata_2019, manganese_bronze_silica.",
     ),
     "swept range with a misspelt bound": (
         "based_on: tube\nsweep: {keys: {sand.size_scale: {low: 4, high: 5, nummer: 3}}}",
