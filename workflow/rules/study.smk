@@ -17,7 +17,12 @@ from sandmould.execution.pool import start_server
 from sandmould.execution.spent import note_spent
 from sandmould.study.plan.batches import alone, read_batches, write_batches
 from sandmould.study.plan.announcement import announce, prepare
-from sandmould.study.plan.build_plan import RESULTS, plan_at_hand, starts_jobs, study_path
+from sandmould.study.plan.build_plan import (
+    RESULTS,
+    plan_at_hand,
+    starts_jobs,
+    study_path,
+)
 from sandmould.study.plan.plan_files import CHECKS as CHECK_TABLES
 from sandmould.study.plan.plan_files import write_run
 from sandmould.study.plan.load_study import CALIBRATED
