@@ -127,8 +127,8 @@ def test_a_plate_with_curves_freezes_as_finite_volumes_say(over_time: bool) -> N
         filling = Filling((DIE, ALLOY), (450.0, 960.0),
                           transfers={(0, 1): Transfer(curve, over_time)})  # fmt: skip
         found = frozen(slab((cells * 3, cells), (0, 1), 0.01 / cells), filling, 0.5)
-        # 0.04 % measured at 1 mm, 0.02 % at 0.5 mm
-        assert found.solidification_time_s == pytest.approx(exact, rel=2e-3)
+        # 0.24 % where h follows temperature: conductances are found anew after a change of 5 K.
+        assert found.solidification_time_s == pytest.approx(exact, rel=5e-3)
         assert np.abs(found.drift_percent).max() < 1e-9
 
 
