@@ -30,6 +30,7 @@ from sandmould.execution.stopping import Stopped, run_in_group, until_stopped
 from sandmould.study.plan.build_plan import RESULTS, Plan, checked_plan, starts_jobs, writing
 from sandmould.study.plan.grain_check import coarser_text
 from sandmould.study.plan.plan_files import SUMMARY
+from sandmould.study.robustness.controls import COARSER
 
 
 def run_study(path: Path, options: Sequence[str], opening: str = "") -> int:
@@ -75,8 +76,9 @@ def _compute(plan: Plan, options: Sequence[str], opening: str) -> int:
         print(f"{plan.study.name}: {runs} of {runs} runs done, nothing left", file=sys.stderr)
         print(f"{opening} {last_line(folder)}".strip())
         return 0
-    while study.decides_more:
-        if _snakemake(plan, options, [str(folder / SUMMARY)]):
+    begun_s = time.monotonic()
+    while starts_jobs(options) and _may_follow(plan):
+        if _snakemake(plan, options, [str(folder / SUMMARY)], begun_s):
             # Stopped, or broken outside the runs: a run that fails leaves its outcome.
             return 1
         from sandmould.study.next_round import decide_next  # statistics: slow to import
@@ -89,7 +91,7 @@ def _compute(plan: Plan, options: Sequence[str], opening: str) -> int:
             print(f"\n{told}", file=sys.stderr, flush=True)
         if log.ended:
             break
-    status = _snakemake(plan, options, [])
+    status = _snakemake(plan, options, [], begun_s)
     if starts_jobs(options) and (said := last_line(folder)):
         print(said if status else f"{opening} {said}".strip())
     if is_whole_study and not status:
@@ -97,8 +99,15 @@ def _compute(plan: Plan, options: Sequence[str], opening: str) -> int:
     return status
 
 
-def _snakemake(plan: Plan, options: Sequence[str], targets: Sequence[str]) -> int:
-    """Have Snakemake compute a study that is shown meanwhile."""
+def _may_follow(plan: Plan) -> bool:
+    """Whether runs may follow that only those of the sweep tell."""
+    study = plan.study.study
+    coarser = any(run.part == COARSER.part for run in (*plan.later, *plan.runs))
+    return bool(study.refine.rounds or study.certificate.controls) or coarser
+
+
+def _snakemake(plan: Plan, options: Sequence[str], targets: Sequence[str], begun_s: float) -> int:
+    """Have Snakemake compute a study that is shown meanwhile; its start was at ``begun_s``."""
     stated = stated_cores(options)
     cores = [] if stated is not None else ["--cores", str(_all_cores())]
     file = str(plan.study.path.absolute())
@@ -111,7 +120,7 @@ def _snakemake(plan: Plan, options: Sequence[str], targets: Sequence[str]) -> in
         return run_in_group(work)
     with writing(folder):
         submits = goes_to_slurm(options)
-        screen = Screen(plan, RESULTS, stated or _all_cores(), submits=submits)
+        screen = Screen(plan, RESULTS, stated or _all_cores(), submits=submits, begun_s=begun_s)
         log = screen.log.open("w", encoding="utf-8")
     with log:
         names = [run.run for run in (*plan.fills, *plan.runs)]

@@ -14,10 +14,11 @@ from sandmould.digest import digest
 _UNITS = (
     ("_w_m2_k", "W/m²/K"), ("_w_m_k", "W/m/K"), ("_j_kg_k", "J/kg/K"), ("_j_kg", "J/kg"),
     ("_kg_m3", "kg/m³"), ("_n_m3", "N/m³"), ("_m_s2", "m/s²"), ("_m2_s", "m²/s"),
-    ("_rad_s", "rad/s"), ("_m_s", "m/s"), ("_n_m", "N/m"), ("_kg_m", "kg m"), ("_kg_s", "kg/s"),
+    ("_m2k_w", "m² K/W"), ("_rad_s", "rad/s"), ("_m_s", "m/s"), ("_n_m", "N/m"),
+    ("_kg_m", "kg m"), ("_kg_s", "kg/s"),
     ("_per_s", "1/s"), ("_fraction", ""), ("_bytes", "bytes"), ("_mb", "MB"), ("_deg", "°"),
     ("_hz", "Hz"), ("_pa", "Pa"), ("_kg", "kg"), ("_m3", "m³"), ("_m2", "m²"), ("_g", "g"),
-    ("_m2k_w", "m² K/W"), ("_m", "m"), ("_s", "s"), ("_h", "h"), ("_n", "N"), ("_j", "J"), ("_k", "K"),
+    ("_m", "m"), ("_s", "s"), ("_h", "h"), ("_n", "N"), ("_j", "J"), ("_k", "K"),
 )  # fmt: skip
 _NAMES = {
     "engine.name": "engine",

@@ -51,6 +51,7 @@ class Screen:
         cores: int,
         live: bool | None = None,
         submits: bool = False,
+        begun_s: float | None = None,
     ) -> None:
         """Look at what is there.
 
@@ -61,6 +62,8 @@ class Screen:
             can.
         submits : bool
             Whether runs are computed by jobs of Slurm, on its cores.
+        begun_s : float, optional, s
+            When the command began, on the clock of ``time.monotonic``; now unless it is given.
         """
         self._folder = results / plan.study.name
         logs = self._folder / "logs"
@@ -93,6 +96,7 @@ class Screen:
         """Whether a run has begun."""
         self._whole = whole
         self._begun_s = time.monotonic()
+        self._command_begun_s = begun_s or self._begun_s
         self._next_line_s = self._begun_s + LINE_EVERY_S
 
     def __enter__(self) -> Screen:
@@ -118,7 +122,7 @@ class Screen:
                 self._table = None
         # Of a start that computed nothing, since its input is bad, there is nothing to count.
         if error is None and (self._ended or self.failures or not self._watch.waiting):
-            passed = duration_text(time.monotonic() - self._begun_s)
+            passed = duration_text(time.monotonic() - self._command_begun_s)
             self._print(f"{self._plan.study.name}: {counts_text(self._view())} after {passed}")
 
     def environment(self) -> dict[str, str]:

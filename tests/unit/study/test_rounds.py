@@ -269,7 +269,7 @@ def test_one_command_drives_all_rounds(tmp_path: Path, monkeypatch: pytest.Monke
     calls: list[list[str]] = []
     computed: list[str] = []
 
-    def snakemake(plan: Plan, options: list[str], targets: list[str]) -> int:
+    def snakemake(plan: Plan, options: list[str], targets: list[str], begun_s: float) -> int:
         calls.append(targets)
         announce(plan, Path("results"), 1)
         for run in plan.runs:
