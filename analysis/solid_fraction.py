@@ -72,6 +72,11 @@ def mean_solid_fraction(
     ----------
     position_m : (n, d) float64, m
     radius_m : (n,) float64, m
+
+    Raises
+    ------
+    ValueError
+        As :func:`solid_fraction_profile`.
     """
     edges_m = np.array([low_m, high_m])
     profile = solid_fraction_profile(position_m, radius_m, scene, edges_m)

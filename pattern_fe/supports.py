@@ -132,7 +132,12 @@ def loose_motions(node_m: Array, fixed: Mask) -> list[str]:
 
 
 def check_held(node_m: Array, fixed: Mask, supports: Supports) -> None:
-    """Refuse statics of a pattern that can move without deforming."""
+    """Refuse statics of a pattern that can move without deforming.
+
+    Raises
+    ------
+    ValueError
+    """
     if supports.bedding_n_m3 > 0.0:
         return
     loose = loose_motions(node_m, fixed)

@@ -49,7 +49,12 @@ class Limit:
         return f"with at most {self.most:,} {self.what}, not {_number(count)}: {self.change}"
 
     def check(self, key: str, count: float, value: Any = None) -> None:
-        """Refuse a count beyond the limit; parameters as in ``problems``."""
+        """Refuse a count beyond the limit; parameters as in ``problems``.
+
+        Raises
+        ------
+        BadInputError
+        """
         if found := [*self.problems(key, count, value)]:
             raise BadInputError(found)
 

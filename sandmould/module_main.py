@@ -37,7 +37,13 @@ def run_main(main: Callable[..., Any], usage: str, counts: Container[int] = (0,)
 
 
 def in_a_sentence(main: Callable[..., Any], *given: Any) -> Any:
-    """Call a function; after bad input or a file that cannot be read it ends with a sentence."""
+    """Call a function; after bad input or a file that cannot be read it ends with a sentence.
+
+    Raises
+    ------
+    SystemExit
+        With one sentence a problem.
+    """
     try:
         return main(*given)
     except BadInputError as error:

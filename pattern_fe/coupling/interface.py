@@ -19,7 +19,12 @@ from sandmould.scenario.solids import Triangles
 
 
 def with_surface(scenario: Scenario) -> Scenario:
-    """The scenario with its pattern among the obstacles, vertex for vertex."""
+    """The scenario with its pattern among the obstacles, vertex for vertex.
+
+    Raises
+    ------
+    BadInputError
+    """
     config = scenario.pattern
     if config is None:
         return scenario

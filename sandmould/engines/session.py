@@ -234,12 +234,21 @@ class SandSession(Session, Protocol):
         """
 
     def move_surface(self, name: str, vertices_m: Array, window_s: float) -> None:
-        """Move a surface to new vertices over the next window, or refuse."""
+        """Move a surface to new vertices over the next window, or refuse.
+
+        Raises
+        ------
+        RefusedError
+        """
 
     def save_checkpoint(self) -> Any:
         """Give all that is needed to compute on from here, in memory, or refuse.
 
         For another iteration of a window; ``write_checkpoint`` is for another process.
+
+        Raises
+        ------
+        RefusedError
         """
 
     def restore_checkpoint(self, checkpoint: Any) -> None:
@@ -249,4 +258,8 @@ class SandSession(Session, Protocol):
         """Let a surface be moved in every step by the loads on it, or refuse.
 
         A session opened from a checkpoint is given it again.
+
+        Raises
+        ------
+        RefusedError
         """

@@ -9,7 +9,13 @@ from sandmould.study.collect import read_summary
 
 
 def failed_runs(study_folder: Path) -> None:
-    """Fail loudly when a run of the study failed."""
+    """Fail loudly when a run of the study failed.
+
+    Raises
+    ------
+    SystemExit
+        Naming each run that did not finish, with its outcome and what was said of it.
+    """
     summary = read_summary(study_folder)
     failed = summary[~finished(summary)].to_dict("records")
     if failed:

@@ -37,7 +37,12 @@ def tells_unit(path: Path) -> bool:
 
 
 def check_numbers(values: NDArray[np.float64], what: str) -> None:
-    """Refuse rows of coordinates that are nowhere."""
+    """Refuse rows of coordinates that are nowhere.
+
+    Raises
+    ------
+    MeshFileError
+    """
     nowhere = ~(np.abs(values.reshape(len(values), -1)) < LARGEST).all(axis=1)
     if nowhere.any():
         place = f"{what} {int(nowhere.argmax()) + 1} of {len(values)} has another"

@@ -35,6 +35,10 @@ def check_crossings(vertices: Array, triangles: Ints, shell: Ints) -> None:
         Of closed shells.
     shell : (nt,) int64
         Which shell each belongs to.
+
+    Raises
+    ------
+    MeshFileError
     """
     count = int(shell.max()) + 1
     volumes = signed_volumes_m3(vertices, triangles)

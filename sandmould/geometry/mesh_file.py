@@ -126,6 +126,10 @@ def check_surface(vertices: Array, triangles: Triangles) -> None:
     ----------
     vertices : (nv, 3) float64
     triangles : (nt, 3) int64
+
+    Raises
+    ------
+    MeshFileError
     """
     if triangles.min() < 0 or triangles.max() >= len(vertices):
         raise MeshFileError(f"triangles between its {len(vertices)} vertices, counted from 0")

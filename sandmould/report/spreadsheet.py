@@ -34,6 +34,11 @@ def write_spreadsheet(study_folder: Path, out: Path) -> None:
     Numbers are cells of numbers, whatever the language of the program that opens them.
 
     ``study_folder``: ``results/<study>`` with its collected tables.
+
+    Raises
+    ------
+    OSError, ValueError
+        When a collected table cannot be read.
     """
     objective, collected = read_study(study_folder).objective, read_collected(study_folder)
     keys, summary = collected.keys, collected.of_sweep.summary

@@ -154,7 +154,13 @@ def write_deck(
 
 
 def refuse(scenario: Scenario) -> None:
-    """Refuse what this engine lacks."""
+    """Refuse what this engine lacks.
+
+    Raises
+    ------
+    RefusedError
+        With one sentence.
+    """
     if scenario.dimension == 3 and scenario.contact.rolling_axes == "all":
         raise RefusedError("contact.rolling_axes", "all", "tangent on engine lammps in 3D")
     if scenario.time_step.rotational_inertia == "scaled":

@@ -142,7 +142,12 @@ def rolling_model(contact: Contact) -> RollingModel | None:
 
 
 def refuse_law(contact: Contact) -> None:
-    """Refuse a law that the contact model cannot say."""
+    """Refuse a law that the contact model cannot say.
+
+    Raises
+    ------
+    RefusedError
+    """
     if contact.slip_normal == "half_step":
         raise RefusedError("contact.slip_normal", "half_step", "full_step on engine liggghts")
     for name in ("grain_grain", "grain_wall"):

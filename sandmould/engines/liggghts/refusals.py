@@ -10,7 +10,13 @@ _HERE = "on engine liggghts"
 
 
 def refuse(scenario: Scenario) -> None:
-    """Refuse what this engine lacks."""
+    """Refuse what this engine lacks.
+
+    Raises
+    ------
+    RefusedError
+        With one sentence.
+    """
     if scenario.engine.ranks > 1:
         raise RefusedError("engine.ranks", scenario.engine.ranks, f"1 {_HERE}")
     if scenario.dimension == 2 and scenario.sand.disc_inertia == "disc":

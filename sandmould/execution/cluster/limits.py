@@ -75,7 +75,13 @@ def minutes(text: str) -> float:
 
 
 def check_jobs(cluster: Cluster, wall_min: int, demands: Iterable[Demand]) -> None:
-    """Let Slurm judge the largest jobs, without submitting one."""
+    """Let Slurm judge the largest jobs, without submitting one.
+
+    Raises
+    ------
+    BadInputError
+        With what it says, once.
+    """
     different = sorted(set(demands))
     largest = {max(different, key=lambda d: d.memory_mb), max(different)} if different else set()
     for demand in sorted(largest)[:_TRIED]:
@@ -86,7 +92,12 @@ def check_jobs(cluster: Cluster, wall_min: int, demands: Iterable[Demand]) -> No
 
 
 def answer(command: Sequence[str], asked: str = "") -> str:
-    """What a program of Slurm says; its refusal of what is asked becomes one sentence."""
+    """What a program of Slurm says; its refusal of what is asked becomes one sentence.
+
+    Raises
+    ------
+    BadInputError
+    """
     try:
         ran = subprocess.run(command, capture_output=True, text=True, timeout=_LIMIT_S, check=False)
     except (OSError, subprocess.TimeoutExpired) as error:

@@ -61,7 +61,12 @@ class Cluster(Section):
 
 
 def read_cluster(path: Path = CLUSTER_FILE) -> Cluster:
-    """Read what the user says; nothing is said where the file is not there."""
+    """Read what the user says; nothing is said where the file is not there.
+
+    Raises
+    ------
+    BadInputError
+    """
     if not path.exists():
         return Cluster()
     return validated(Cluster, read_yaml(path, str(path)), Origin({"": str(path)}))

@@ -131,6 +131,11 @@ def open_submission(plan: Plan, arguments: Sequence[str], stated: Mapping[str, A
         Snakemake's command line.
     stated : mapping
         Its default resources, which hold where ``cluster.yaml`` says nothing.
+
+    Raises
+    ------
+    BadInputError
+        Where ``cluster.yaml`` is wrong.
     """
     if not goes_to_slurm(arguments):
         return Submission(plan, None)

@@ -145,7 +145,13 @@ def write_batches(batches: Iterable[Batch], folder: Path) -> None:
 
 
 def read_batches(runs: Iterable[Run], folder: Path) -> list[Batch]:
-    """Read what ``write_batches`` wrote: batches of some runs, those not listed left out."""
+    """Read what ``write_batches`` wrote: batches of some runs, those not listed left out.
+
+    Raises
+    ------
+    OSError, ValueError
+        When it cannot be read.
+    """
     by_name = {run.run: run for run in runs}
     batches = []
     for name, (beside, names) in read_json(folder / _LIST).items():

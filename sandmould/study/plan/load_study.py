@@ -89,7 +89,13 @@ class StudyFile:
 
 
 def open_study(path: Path, text: str | None = None) -> OpenStudy:
-    """Read a study with all that it is based on, and check it."""
+    """Read a study with all that it is based on, and check it.
+
+    Raises
+    ------
+    BadInputError
+        With one line a problem, each naming the file that holds the bad value.
+    """
     return study_of(study_files(path, text))
 
 

@@ -53,7 +53,13 @@ def owner_path(folder: Path) -> Path | None:
 
 
 def check_owner(path: Path, folder: Path) -> None:
-    """Refuse results that belong to another study file of the same name, while that is there."""
+    """Refuse results that belong to another study file of the same name, while that is there.
+
+    Raises
+    ------
+    BadInputError
+        With the file that they belong to.
+    """
     owner, own = owner_path(folder), owner_text(path)
     if owner is not None and owner_text(owner) != own:
         valid = (

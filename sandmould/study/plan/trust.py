@@ -66,7 +66,12 @@ def may_run(study: OpenStudy, runs: Sequence[Run]) -> bool:
 
 
 def check_trust(study: OpenStudy, runs: Sequence[Run]) -> None:
-    """See that the user has allowed what the runs would execute."""
+    """See that the user has allowed what the runs would execute.
+
+    Raises
+    ------
+    BadInputError
+    """
     if not may_run(study, runs):
         foreign = _foreign(study, runs)
         valid = (
@@ -82,6 +87,10 @@ def check_places(study: OpenStudy) -> None:
 
     Snakemake hands a job's command to Slurm in double quotes, where a shell executes ``$(...)``;
     engines put variables, times and ranks in place of ``$``, ``*`` and ``%``.
+
+    Raises
+    ------
+    BadInputError
     """
     places = {"STUDY": study.path.absolute(), "working folder": Path.cwd(), "installation": ROOT}
     problems = [
@@ -98,6 +107,10 @@ def check_letters(runs: Sequence[Run]) -> None:
 
     In a working folder with other letters than ASCII a run fails while it is computed, with
     "'utf-8' codec can't decode byte".
+
+    Raises
+    ------
+    BadInputError
     """
     engines = {getattr(getattr(run.scenario, "engine", None), "name", "") for run in runs}
     here = str(Path.cwd())

@@ -79,7 +79,13 @@ def read_rounds(folder: Path, study: Study) -> RoundLog:
 
 
 def log_of(text: bytes) -> RoundLog:
-    """Rounds from a file's bytes."""
+    """Rounds from a file's bytes.
+
+    Raises
+    ------
+    ValueError
+        When they are no list of rounds.
+    """
     try:
         return TypeAdapter(RoundLog).validate_json(text)
     except ValueError:

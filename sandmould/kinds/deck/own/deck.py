@@ -147,7 +147,12 @@ def template_text(scenario: OwnDeck) -> str:
 
 
 def check_unchanged(scenario: OwnDeck, is_rendered: bool = False) -> None:
-    """See that files are those of the plan, and the template unless its deck is there."""
+    """See that files are those of the plan, and the template unless its deck is there.
+
+    Raises
+    ------
+    BadInputError
+    """
     now = scenario.sha256 | with_file_hashes(scenario).sha256
     if not is_rendered:
         now = with_deck_hash(with_file_hashes(scenario)).sha256
