@@ -12,9 +12,6 @@ from dataclasses import dataclass
 from typing import Literal
 
 import numpy as np
-from matplotlib import colormaps
-from matplotlib.colors import to_hex
-from matplotlib.ticker import MaxNLocator
 from numpy.typing import NDArray
 
 WIDE = (880, 400)
@@ -47,6 +44,9 @@ def tints(n: int, ordered: bool) -> tuple[Tint, ...]:
     """
     if not ordered:
         return tuple(Tint(c, c) for c in (_OKABE_ITO * (n // len(_OKABE_ITO) + 1))[:n])
+    from matplotlib import colormaps  # slow to import, and not every report has a chart
+    from matplotlib.colors import to_hex
+
     steps = np.linspace(0.0, 1.0, n) if n > 1 else np.array([0.5])
     viridis = colormaps["viridis"]
     # neither end may sink into its page
@@ -289,6 +289,8 @@ def _range(values: Sequence[float], tight: bool = False) -> tuple[float, float]:
 
 
 def _round_ticks(low: float, high: float, most: int) -> tuple[float, ...]:
+    from matplotlib.ticker import MaxNLocator
+
     ticks = np.asarray(MaxNLocator(most, steps=[1, 2, 2.5, 5, 10]).tick_values(low, high))
     return tuple(t for t in ticks.tolist() if low - 1e-12 <= t <= high + 1e-12)
 

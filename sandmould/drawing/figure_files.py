@@ -9,11 +9,8 @@ from collections.abc import Iterable, Mapping, Sequence
 from pathlib import Path
 
 from jinja2 import Environment
-from matplotlib.figure import Figure
-from PIL import Image
 
 from sandmould.drawing.chart import WIDE, Chart, lay_out
-from sandmould.drawing.figures import png_bytes
 
 _PICTURE_IN = 4.2
 _HEADING_IN = 0.3
@@ -28,6 +25,11 @@ def strip(panels: Sequence[tuple[str, str]]) -> bytes:
     panels : sequence of (str, str)
         At least one heading and ``data:`` address, all of one size.
     """
+    from matplotlib.figure import Figure  # slow to import, and few reports have a strip
+    from PIL import Image
+
+    from sandmould.drawing.figures import png_bytes
+
     images = [
         (heading, Image.open(io.BytesIO(_image_bytes(address)))) for heading, address in panels
     ]

@@ -7,13 +7,10 @@ import zlib
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, replace
 
-import fast_simplification
 import numpy as np
-import trimesh
 from matplotlib import colormaps
 from matplotlib.colors import to_hex
 from numpy.typing import NDArray
-from scipy.spatial import cKDTree
 
 from sandmould.analysis.plots import LAYER_COLOURS
 from sandmould.drawing.figures import cut_m
@@ -54,6 +51,8 @@ class SurfaceField:
 
     def shades(self, vertices_m: Array) -> NDArray[np.uint8]:
         """Shade of each vertex."""
+        from scipy.spatial import cKDTree  # slow to import, as what else is imported late here
+
         known = np.isfinite(self.value)
         tree = cKDTree(self.place_m[known])
         apart_m, at = tree.query(vertices_m, distance_upper_bound=2.0 * self.spacing_m)
@@ -144,6 +143,8 @@ def _triangles(solid: Solid) -> tuple[Array, NDArray[np.int64]]:
     assert isinstance(mesh, TriangleMesh)
     vertices_m, triangles = mesh.vertices_m, mesh.triangles
     if len(triangles) > MOST_TRIANGLES:
+        import fast_simplification
+
         vertices_m, triangles = fast_simplification.simplify(
             vertices_m, triangles, target_count=MOST_TRIANGLES
         )
@@ -202,6 +203,8 @@ def _packed(
 
 def sharp_edges(vertices_m: Array, triangles: NDArray[np.int64]) -> NDArray[np.int64]:
     """Edges at which a surface turns, or ends: their vertices, (k, 2) int64."""
+    import trimesh
+
     mesh = trimesh.Trimesh(vertices_m, triangles, process=False)
     flat = mesh.face_adjacency_edges[mesh.face_adjacency_angles < _SHARP_RAD]
     edges = trimesh.grouping.boolean_rows(mesh.edges_unique, flat, np.setdiff1d)

@@ -6,6 +6,7 @@ from jinja2 import Environment, FileSystemLoader, StrictUndefined
 from jinja2.sandbox import ImmutableSandboxedEnvironment
 
 from sandmould import SHIPPED
+from sandmould.kept_templates import kept_templates
 from sandmould.runs.formatting import number
 
 TEMPLATES = SHIPPED / "templates" / "report"
@@ -16,6 +17,7 @@ def page_environment() -> Environment:
     environment = ImmutableSandboxedEnvironment(
         loader=FileSystemLoader(TEMPLATES),
         undefined=StrictUndefined,
+        bytecode_cache=kept_templates(),
         autoescape=True,
         trim_blocks=True,
         lstrip_blocks=True,

@@ -14,7 +14,7 @@ from sandmould.definition.study import Study
 from sandmould.drawing.figure_files import pictures, strip
 from sandmould.report.kinds.kind import Findings
 from sandmould.report.kinds.registry import report_of
-from sandmould.report.repose_figures import Heap, draw_map, draw_posterior, plotted
+from sandmould.report.pictured_runs import Heap
 from sandmould.report.tables import Cell, Column, Table
 from sandmould.runs.columns import CPU_S, RUN, total_s
 from sandmould.runs.formatting import (
@@ -153,6 +153,8 @@ def _touching(summary: pd.DataFrame) -> list[str]:
 
 def _map_table(settings: Sequence[Setting], keys: tuple[str, str]) -> Table:
     """The measure over both keys, the second across, as the paper's Figure 11."""
+    from sandmould.report.repose_figures import plotted  # it draws: slow to import
+
     rows_of = sorted({s.values[keys[0]] for s in settings})
     columns_of = sorted({s.values[keys[1]] for s in settings})
     at = {(s.values[keys[0]], s.values[keys[1]]): s for s in settings}
@@ -177,6 +179,8 @@ def _map_table(settings: Sequence[Setting], keys: tuple[str, str]) -> Table:
 def _map_picture(
     summary: pd.DataFrame, keys: Sequence[str], measure: str, calibrated: Calibrated | None
 ) -> str:
+    from sandmould.report.repose_figures import draw_map
+
     pair, points = (keys[0], keys[1]), summary[list(keys)].to_numpy(dtype=np.float64)
     values = np.asarray(usable_values(summary, measure), dtype=np.float64)
     emulator = calibrated.emulators.get(measure) if calibrated else None
@@ -210,6 +214,8 @@ def _sand(sand: CalibratedSand, calibrated: Calibrated) -> SandEstimate:
     more = len(sand.sand.targets) + len(sand.sand.assumed) > 1
     in_all = f"; all that is known tells {sand.posterior.bits:.1f}" if more else ""
     said.append(f"{ridge}{in_all}.")
+    from sandmould.report.repose_figures import draw_posterior
+
     return SandEstimate(name, tuple(said), draw_posterior(sand, calibrated.keys))
 
 

@@ -44,8 +44,8 @@ from sandmould.report.optimum import (
     optimum_pages,
     with_surface,
 )
+from sandmould.report.pictured_runs import pictured_runs
 from sandmould.report.robustness import RobustnessPages
-from sandmould.report.sand import pictured_runs
 from sandmould.report.tables import (
     KeyNumber,
     data_files,

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
@@ -19,6 +18,7 @@ from sandmould.drawing.figures import cut_m, panel, png
 from sandmould.engines.snapshot import Snapshot
 from sandmould.kinds.sand.moments import list_moments
 from sandmould.kinds.sand.outflow import slopes
+from sandmould.report.pictured_runs import Heap
 from sandmould.runs.columns import RUN
 from sandmould.runs.formatting import name_of, number, unit_of
 from sandmould.scenario.scenario import Scenario
@@ -148,15 +148,6 @@ def draw_posterior(sand: CalibratedSand, keys: tuple[str, str]) -> str:
 
 
 PICTURED_HEAPS = 3
-
-
-@dataclass(frozen=True)
-class Heap:
-    """A picture of the sand at rest with the fitted lines."""
-
-    heading: str
-    picture: str
-    alt: str
 
 
 def steepest_heaps(

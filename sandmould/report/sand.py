@@ -21,7 +21,7 @@ from sandmould.drawing.sphere_film import SphereFilm, sphere_frames
 from sandmould.drawing.sphere_scene import SurfaceField, sphere_scene
 from sandmould.engines.snapshot import Snapshot
 from sandmould.kinds.sand.moments import MOMENTS, Moment, list_moments, nearest
-from sandmould.report.curves import runs_of
+from sandmould.report.pictured_runs import pictured_runs
 from sandmould.report.time_series import measure_curves
 from sandmould.runs.columns import (
     BED_HEIGHT_M,
@@ -33,7 +33,7 @@ from sandmould.runs.columns import (
 )
 from sandmould.runs.formatting import listed, name_of, number, setting_text
 from sandmould.scenario.scenario import Scenario
-from sandmould.statistics.verdict import Verdict, rank_runs
+from sandmould.statistics.verdict import Verdict
 from sandmould.study.collect import Collected
 from sandmould.study.plan.plan_files import SPHERES, read_run
 
@@ -124,28 +124,6 @@ def sand_pages(
 def _clock_s(moment: Moment) -> float:
     """Time of vibration, or of the run where nothing vibrates."""
     return moment.time_s if math.isnan(moment.vibration_time_s) else moment.vibration_time_s
-
-
-def pictured_runs(study_folder: Path, summary: pd.DataFrame, verdict: Verdict) -> dict[str, str]:
-    """Runs to be looked at, by role: of the best setting, median and worst, or what there is.
-
-    Of the best setting it is the run in the middle, not the luckiest. Where one run can be used it
-    is the only one. Where none can, that with most snapshots stands alone: to see how it failed.
-    """
-    ranks = rank_runs(summary, verdict.measure, verdict.better)
-    if "best" in ranks and verdict.best is not None:
-        own = rank_runs(runs_of(summary, verdict.best), verdict.measure, verdict.better)
-        best = own.get("median", own["best"])
-        others = {role: run for role, run in ranks.items() if role != "best" and run != best}
-        ranks = {"best": best, **others}
-    with_snapshots = {
-        r: run for r, run in ranks.items() if list_moments(study_folder / "runs" / run)
-    }
-    if with_snapshots:
-        return with_snapshots if len(ranks) > 1 else {"only": next(iter(with_snapshots.values()))}
-    count = {str(r): len(list_moments(study_folder / "runs" / str(r))) for r in summary[RUN]}
-    longest = max(count, key=lambda r: count[r], default="")
-    return {"longest": longest} if count.get(longest) else {}
 
 
 def _role_text(role: str, verdict: Verdict, summary: pd.DataFrame) -> str:

@@ -38,8 +38,12 @@ def _environment() -> Environment:
     from jinja2 import FileSystemLoader, StrictUndefined  # a plan is checked without words
     from jinja2.sandbox import ImmutableSandboxedEnvironment
 
+    from sandmould.kept_templates import kept_templates
+
     environment = ImmutableSandboxedEnvironment(
-        loader=FileSystemLoader(TEMPLATES), undefined=StrictUndefined
+        loader=FileSystemLoader(TEMPLATES),
+        undefined=StrictUndefined,
+        bytecode_cache=kept_templates(),
     )
     filters = (listed, number, rounded, seconds)
     environment.filters |= {it.__name__: it for it in filters} | {"name": name_of}

@@ -22,7 +22,11 @@ class Section(BaseModel):
     """A part of a scenario: unknown keys are refused, values never change once read."""
 
     model_config = ConfigDict(
-        extra="forbid", frozen=True, allow_inf_nan=False, validate_default=True
+        defer_build=True,  # few of all models are used by one process
+        extra="forbid",
+        frozen=True,
+        allow_inf_nan=False,
+        validate_default=True,
     )
 
 

@@ -13,7 +13,7 @@ from sandmould.definition.study import Study
 from sandmould.drawing.chart import Chart
 from sandmould.kinds.kind import ScenarioT
 from sandmould.report.bed_mode import BedMode
-from sandmould.report.repose_figures import Heap
+from sandmould.report.pictured_runs import Heap
 from sandmould.report.robustness import RobustnessPages
 from sandmould.runs.templates import Note
 from sandmould.scenario.drive import BoxDrive

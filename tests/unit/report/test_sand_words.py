@@ -9,7 +9,8 @@ import pandas as pd
 import pytest
 
 from sandmould.engines.snapshot import Snapshot
-from sandmould.report.sand import _density_conclusion, _role_text, pictured_runs
+from sandmould.report.pictured_runs import pictured_runs
+from sandmould.report.sand import _density_conclusion, _role_text
 from sandmould.statistics.verdict import Verdict, compare_settings
 
 FILL = "tube_fill_fraction"
