@@ -26,6 +26,7 @@ from sandmould.runs.formatting import (
     unit_of,
     with_margin,
 )
+from sandmould.runs.templates import sentences, worded
 from sandmould.statistics.calibration.sands import Calibrated, CalibratedSand
 from sandmould.statistics.emulator import TooFewRunsError, fit_emulator
 from sandmould.statistics.evidence import usable_values
@@ -42,6 +43,8 @@ class SandEstimate:
     sentences: tuple[str, ...]
     posterior: str
     """Picture; empty where none was found."""
+    values: tuple[str, ...]
+    """Most probable, each with its name and its standard deviation."""
 
 
 @dataclass(frozen=True)
@@ -76,16 +79,16 @@ def estimate_pages(page: Findings[Any]) -> EstimatePages | None:
     settings = [s for s in verdict.settings if s.n]
     calibrated = read_calibrated(study_folder, study, summary, keys)
     sands = tuple(_sand(sand, calibrated) for sand in calibrated.sands) if calibrated else ()
-    sentences = [*detail_sentences(answer), *_reported(settings, verdict.measure, study)]
-    sentences += _touching(summary)
-    sentences += [sentence for sand in sands for sentence in sand.sentences[:1]]
+    said = [*detail_sentences(answer), *_reported(settings, verdict.measure, study)]
+    said += _touching(summary)
+    said += [sentence for sand in sands for sentence in sand.sentences[:1]]
     numeric = [k for k in keys if pd.api.types.is_numeric_dtype(summary[k])]
     is_map = len(keys) == 2 and len(numeric) == 2
     what = name_of(verdict.measure)
     return EstimatePages(
         title="Angle of repose" if verdict.measure == "heap_angle_deg" else what.capitalize(),
         headline=_headline(sands),
-        sentences=tuple(sentences) or (first_sentence(answer),),
+        sentences=tuple(said) or (first_sentence(answer),),
         sound=bool(settings) and all(sand.posterior for sand in sands),
         heaps=report_of(page.scenario).heaps(study_folder, summary, verdict, page.scenario),
         map=_map_table(settings, (keys[0], keys[1])) if is_map and settings else None,
@@ -97,15 +100,12 @@ def estimate_pages(page: Findings[Any]) -> EstimatePages | None:
 
 
 def _headline(sands: Sequence[SandEstimate]) -> str:
-    """Which sands were calibrated; empty where none was to be."""
+    """Which sands were calibrated, and to what; empty where none was to be."""
     if not sands:
         return ""
-    found = [sand.name for sand in sands if sand.posterior]
     lacking = [sand.name for sand in sands if not sand.posterior]
-    if not found:
-        return f"No frictions give what was measured of {listed(lacking)}."
-    none = f"; none for {listed(lacking)}" if lacking else ""
-    return f"Found frictions for {listed(found)}{none}."
+    found = [sand for sand in sands if sand.posterior]
+    return worded("calibrated_head.j2", found=found, lacking=lacking)
 
 
 def estimate_figures(pages: EstimatePages) -> dict[str, bytes]:
@@ -194,29 +194,30 @@ def _map_picture(
 
 def _sand(sand: CalibratedSand, calibrated: Calibrated) -> SandEstimate:
     """What is said of a calibrated sand."""
-    name = sand.sand.name
-    if sand.posterior is None or sand.by_first is None:
-        return SandEstimate(name, (f"{name}: {sand.problem}.",), "")
-    values = [
-        f"{name_of(key)} {with_margin(mode, sd)}"
-        for key, mode, sd in zip(
-            calibrated.keys, sand.posterior.mode, sand.posterior.sd, strict=True
-        )
-    ]
-    targets = listed([f"{name_of(m)} {t.value:g} ± {t.sd:g}" for m, t in sand.sand.targets.items()])
-    taken = [f"{name_of(k)} {t.value:g} ± {t.sd:g}" for k, t in sand.sand.assumed.items()]
-    granted = f", {listed(taken)} taken for granted" if taken else ""
-    said = [
-        f"{name}, measured {targets}{granted}: most probable are {listed(values)} (standard "
-        f"deviations), which are correlated by {sand.posterior.correlation:.2f}."
-    ]
-    ridge = f"One measured value leaves a ridge, {sand.by_first.bits:.1f} bits of the two"
-    more = len(sand.sand.targets) + len(sand.sand.assumed) > 1
-    in_all = f"; all that is known tells {sand.posterior.bits:.1f}" if more else ""
-    said.append(f"{ridge}{in_all}.")
+    name, known = sand.sand.name, sand.posterior
+    if known is None or sand.by_first is None:
+        said = sentences("calibrated.j2", sand=name, problem=sand.problem)
+        return SandEstimate(name, said, "", ())
     from sandmould.report.repose_figures import draw_posterior
 
-    return SandEstimate(name, tuple(said), draw_posterior(sand, calibrated.keys))
+    values = tuple(
+        f"{name_of(key)} {with_margin(mode, sd)}"
+        for key, mode, sd in zip(calibrated.keys, known.mode, known.sd, strict=True)
+    )
+    taken = [f"{name_of(k)} {t.value:g} ± {t.sd:g}" for k, t in sand.sand.assumed.items()]
+    said = sentences(
+        "calibrated.j2",
+        sand=name,
+        problem="",
+        targets=[f"{name_of(m)} {t.value:g} ± {t.sd:g}" for m, t in sand.sand.targets.items()],
+        taken=taken,
+        values=values,
+        correlation=known.correlation,
+        # A bit halves what is possible.
+        first_percent=100.0 * 2.0**-sand.by_first.bits,
+        all_percent=100.0 * 2.0**-known.bits if len(sand.sand.targets) + len(taken) > 1 else None,
+    )
+    return SandEstimate(name, said, draw_posterior(sand, calibrated.keys), values)
 
 
 def _worth_table(calibrated: Calibrated) -> Table:

@@ -45,7 +45,7 @@ REASONS = {
     "lags": "in {} the loop between sand and pattern lags",
     "cycles": "in {} the loop between sand and pattern goes in cycles",
     "diverged": "in {} the loop between sand and pattern diverged",
-    "no value": "{} without a value",
+    "no value": "{} gave no value",
 }
 """Why runs do not count, by the name of the reason."""
 

@@ -21,7 +21,7 @@ from sandmould.scenario.fill import Fill, Layer
 from sandmould.scenario.scenario import Scenario
 from sandmould.study.calibration.run import write_calibration
 from sandmould.study.collect import collect
-from sandmould.study.plan.plan_files import read_run
+from sandmould.study.plan.plan_files import VERDICT_FILE, read_run
 from tests.planned import write_plan
 
 FRICTION = "contact.grain_grain.friction"
@@ -133,10 +133,18 @@ def test_a_map_has_its_table_its_picture_and_its_sands(mapped: Path) -> None:
     text = (mapped / "report.html").read_text(encoding="utf-8")
     # Planted from 17 to 37 degrees.
     assert re.search(r"The heap angle goes from 1[67]\.\d° .* to 3[67]\.\d° ", text)
-    assert '<p class="first">Found frictions for sand_26; none for sand_80.</p>' in text
+    assert (mapped / VERDICT_FILE).read_text(encoding="utf-8") == (
+        "sand_26 has friction 0.28 ± 0.12 and rolling arm 0.137 ± 0.058. Nothing on the map gives "
+        "what was measured of sand_80.\n"
+    )
     assert "Contour map of the heap angle" in text
     assert "5.71°" in text  # tan(alpha) = 0.1 as an angle
-    assert "sand_26, measured heap angle 26 ± 0.5" in text
+    assert (
+        "sand_26: heap angle 26 ± 0.5 was measured; most probable are friction 0.28 ± 0.12 and "
+        "rolling arm 0.137 ± 0.058 (± a standard deviation)."
+    ) in text
+    assert "with more of the one, less of the other fits nearly as well." in text
+    assert "By the first measured value alone 18 % of the map is still possible." in text
     assert "heap_angle_deg = 80 cannot be calibrated: the runs" in text
     assert "Posterior of sand_26" in text
     names = {path.name for path in (mapped / "figures").iterdir()}

@@ -308,7 +308,7 @@ def test_many_drawn_settings(tmp_path: Path) -> None:
 def test_study_of_twins_begins_with_whether_they_agree(tmp_path: Path) -> None:
     fill = {**dict.fromkeys(ENGINES, 0.5), "reference": 0.6}
     text = report(write_twins(tmp_path / "twins", fill, dict.fromkeys(ENGINES, 0.78)))
-    assert first_sentence(text).startswith("They differ by more than the margin in fill")
+    assert first_sentence(text).startswith("Settings differ by more than the margin in fill")
     page = Page(text)
     for said in (
         "Do the settings agree?",

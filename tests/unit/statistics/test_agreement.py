@@ -105,7 +105,7 @@ def test_planted_difference_between_engines_is_found(tmp_path: Path) -> None:
     assert judged["solid_fraction", "lammps", "reference"] == "equivalent"
     sentences = agreement_sentences(found)
     assert sentences == (
-        "They differ by more than the margin in fill of the tube (lammps – reference and "
+        "Settings differ by more than the margin in fill of the tube (lammps – reference and "
         "liggghts – reference), at 90 %.",
         "4 of 6 comparisons agree within the margins set beforehand.",
     )
