@@ -77,7 +77,7 @@ def expand(
     every = range(1, study.study.replicates + 1)
     planned = points(study.study.sweep, study.study.scenario)
     swept = [(point, every) for point in planned]
-    added = [(_as_planned(point, planned), range(n, n + 1)) for point, n in more]
+    added = [(as_planned(point, planned), range(n, n + 1)) for point, n in more]
     certificate = study.study.certificate
     key = frequency_key(study.study.sweep)
     controlled = {}
@@ -144,8 +144,8 @@ def coarser_runs(study: OpenStudy, point: Point, replicates: Iterable[int]) -> l
     return [] if wrong else list(at_point.control(COARSER, scenario, replicates))
 
 
-def _as_planned(point: Point, planned: Sequence[Point]) -> Point:
-    """A point of a round as the sweep has it now: the files that it names may have moved since."""
+def as_planned(point: Point, planned: Sequence[Point]) -> Point:
+    """A chosen point as the sweep has it now: the files that it names may have moved since."""
     named = by_name(point)
     if named == point or point in planned:
         return point

@@ -6,13 +6,13 @@ from collections.abc import Sequence
 from typing import Any
 
 from sandmould.definition.run import Run
-from sandmould.definition.sweep import Point
+from sandmould.definition.sweep import Point, points
 from sandmould.kinds.kind import Planning
 from sandmould.kinds.registry import kind_named
 from sandmould.runs.columns import SWEEP
 from sandmould.runs.formatting import listed, setting_text
 from sandmould.statistics.grain_check import FACTOR, FEWEST
-from sandmould.study.plan.expand import coarser_runs
+from sandmould.study.plan.expand import as_planned, coarser_runs
 from sandmould.study.plan.fills import own_work, share_fills
 from sandmould.study.plan.load_study import OpenStudy
 from sandmould.study.robustness.controls import COARSER
@@ -37,8 +37,8 @@ def affordable_runs(study: OpenStudy, best: Sequence[Point], planned: Sequence[R
     """
     planning = kind_named(study.study.kind).planning
     allowed = study.study.grain_price_share * _work(planned, planning)
-    of_points = []
-    for point in best[:2]:
+    of_points, swept = [], points(study.study.sweep, study.study.scenario)
+    for point in (as_planned(chosen, swept) for chosen in best[:2]):
         of_point = {r.replicate for r in planned if r.part == SWEEP and r.parameters == point}
         of_points.append(coarser_runs(study, point, sorted(of_point)))
     for chosen in (of_points, of_points[:1]):

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import shutil
 from pathlib import Path
 from typing import Any
 
@@ -11,6 +12,7 @@ import pandas as pd
 import pytest
 import yaml
 
+from sandmould import SHIPPED
 from sandmould.report.grain_size import FILLED_S, grain_size_pages
 from sandmould.runs.columns import PART
 from sandmould.scenario.sand import Sand
@@ -18,7 +20,7 @@ from sandmould.statistics.grain_check import FACTOR
 from sandmould.study.collect import Collected
 from sandmould.study.plan.build_plan import Plan, open_plan
 from sandmould.study.plan.fills import own_work
-from sandmould.study.plan.grain_check import coarser_text
+from sandmould.study.plan.grain_check import affordable_runs, coarser_text
 from sandmould.study.plan.plan_files import later_lines
 from sandmould.study.plan.price import Prices
 from sandmould.study.robustness.controls import COARSER
@@ -154,3 +156,36 @@ def test_the_report_tells_the_change_and_what_finer_grains_should_give(tmp_path:
     assert FILLED_S in {row[1].sort for row in pages.table.rows}
     of_sweep = Collected(summary[:12], curves, (KEY,))
     assert grain_size_pages(study, of_sweep, study.scenario, "50 Hz") is None
+
+
+def test_the_files_of_its_points_may_have_moved(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    text = """\
+scenario:
+  engine: {name: reference}
+  dimension: 3
+  sand: {size_scale: 16}
+  box: {width_m: 0.12, depth_m: 0.1, height_m: 0.16}
+  obstacles: [{kind: mesh, file: part.stl, unit_m: 0.001, position_m: [0.06, 0.05, 0.06]}]
+  fill: {layers: [{count: 40}]}
+  vibration: [{frequency_hz: 50, acceleration_g: 1.5, duration_s: 0.5}]
+sweep: {keys: {obstacles.0.file: [part.stl, other.stl]}}
+replicates: 3
+objective: {measure: solid_fraction, better: larger}
+grain_check: {price_share: 1.0}
+"""
+    names: list[list[str]] = []
+    best: list[dict[str, Any]] = []
+    for where in (tmp_path / "here", tmp_path / "there"):
+        where.mkdir()
+        monkeypatch.chdir(where)
+        (where / "drawn.yaml").write_text(text)
+        for file in ("part.stl", "other.stl"):
+            shutil.copy(SHIPPED / "config/meshes/bracket.stl", where / file)
+        plan = open_plan(Path("drawn.yaml"))
+        best = best or [plan.runs[0].parameters]
+        coarser = affordable_runs(plan.study, best, plan.runs)
+        names.append([run.run for run in coarser])
+    assert names[0] == names[1]
+    assert len(names[0]) == 3
