@@ -72,6 +72,7 @@ class Claim:
         OSError
             Where the folder takes no file.
         """
+        folder = folder.absolute()  # an engine may work in another folder while it is renewed
         self._path = folder / CLAIM_FILE
         self._lost = lost
         job = os.environ.get("SLURM_JOB_ID", "")

@@ -20,7 +20,9 @@ from sandmould.engines.registry import engine_of
 from sandmould.engines.snapshot import Snapshot
 from sandmould.engines.snapshot_file import stored_snapshots
 from sandmould.execution.jobs import compute_batch
+from sandmould.execution.pool import do, start_server
 from sandmould.execution.simulate import render_run
+from sandmould.execution.simulate import simulate as simulate_run
 from sandmould.kinds.sand.execution import SandExecution
 from sandmould.runs.hashing import scenario_hash
 from sandmould.runs.outcome import RunOutcome
@@ -47,10 +49,15 @@ def simulating(folder: Path) -> list[str]:
 
 def simulate(folder: Path, largest_file_bytes: int | None = None) -> int:
     """Compute a run in a process of its own; no file may grow larger than asked."""
+    if largest_file_bytes is None:
+        logs = folder.parent.parent / "logs"
+        logs.mkdir(exist_ok=True)
+        start_server([folder])  # a fork has loaded what a new process imports for seconds
+        return do(simulate_run, folder, log=logs / "simulate.log").status
+    limits = (largest_file_bytes,) * 2
 
     def limit() -> None:
-        if largest_file_bytes is not None:
-            resource.setrlimit(resource.RLIMIT_FSIZE, (largest_file_bytes,) * 2)
+        resource.setrlimit(resource.RLIMIT_FSIZE, limits)
 
     ran = subprocess.run(simulating(folder), capture_output=True, text=True, preexec_fn=limit)
     return ran.returncode

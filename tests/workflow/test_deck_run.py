@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+import re
 import signal
 import subprocess
 import sys
@@ -15,9 +16,12 @@ import pandas as pd
 import pytest
 import yaml
 
+from sandmould.execution.locks import computing
 from sandmould.execution.packs.pack import pack
 from sandmould.execution.packs.unpack import unpack
 from sandmould.execution.simulate import measure_run, render_run, simulate
+from sandmould.kinds.deck.own import computation
+from sandmould.runs import claim, progress
 from sandmould.runs.outcome import Outcome, RunOutcome
 from sandmould.runs.run_tables import read_costs
 from sandmould.study.plan.build_plan import open_plan
@@ -190,6 +194,20 @@ thermo 10
 dump grains all custom 25 grains.dump id z
 run 100
 """
+
+
+def test_a_run_named_from_here_keeps_its_lock_and_shows_how_far_it_is(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    folder = planned(tmp_path, FALLING, **LAMMPS).relative_to(tmp_path)
+    monkeypatch.chdir(tmp_path)
+    for where, name in ((claim, "BEAT_S"), (computation, "LINE_EVERY_S"),
+                        (computation, "FLUSH_EVERY_S"), (progress, "STATE_EVERY_S")):  # fmt: skip
+        monkeypatch.setattr(where, name, 0.02)
+    with computing(folder):
+        assert simulate(folder) == 0
+    assert RunOutcome.read(folder / "outcome.json").outcome is Outcome.FINISHED
+    assert re.search(r"\d % +deck ", capsys.readouterr().err)
 
 
 def test_measures_of_a_fall_are_those_worked_out_by_hand(tmp_path: Path) -> None:

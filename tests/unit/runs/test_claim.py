@@ -88,6 +88,22 @@ def test_an_owner_renews_its_claim_and_hears_of_its_loss(tmp_path: Path) -> None
     assert lost.wait(5.0)
 
 
+def test_a_claim_is_kept_by_a_process_that_works_in_another_folder(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    (tmp_path / "run").mkdir()
+    monkeypatch.chdir(tmp_path)
+    lost = threading.Event()
+    mine = Claim(Path("run"), alone=True, lost=lost.set)
+    first = Path("run", CLAIM_FILE).stat().st_mtime
+    monkeypatch.chdir("/")
+    time.sleep(0.3)
+    assert not lost.is_set()
+    assert (tmp_path / "run" / CLAIM_FILE).stat().st_mtime > first
+    mine.let_go()
+    assert not (tmp_path / "run" / CLAIM_FILE).exists()
+
+
 def test_where_the_file_system_has_no_locks_the_claim_keeps_two_apart(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:

@@ -56,6 +56,7 @@ def compute(scenario: OwnDeck, folder: Path, run: str, study: str) -> Computed:
     engine, reader = engine_module(scenario.engine.name), deck_reader(scenario.engine.name)
     world = engine.communicator()
     is_root = world is None or world.rank == 0
+    folder = folder.absolute()  # the engine works in a folder of its own
     work = folder / "work"
     output, rendered = work / OUTPUT, folder / _DECK
     candidates = [f"../{path.name}" for path in restarts(scenario, work)] if is_root else []
