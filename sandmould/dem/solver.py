@@ -18,13 +18,7 @@ from sandmould.dem.kinds import pair_up
 from sandmould.dem.lanes import lanes_of_processor
 from sandmould.dem.motion import kick
 from sandmould.dem.moving_state import from_arrays, to_arrays
-from sandmould.dem.near_pairs import (
-    Contacts,
-    contacts_of,
-    move_contacts,
-    near_gap,
-    new_near_pairs,
-)
+from sandmould.dem.near_pairs import Contacts, contacts_of, move_contacts, near_gap, new_near_pairs
 from sandmould.dem.neighbours import Pairs, extent_of, list_pairs, make_grid, sort_into_cells
 from sandmould.dem.steps import (
     LIST_IS_OLD,

@@ -23,12 +23,7 @@ from sandmould.pattern_fe.scene import pattern_of
 from sandmould.report.bending_figures import coupling_map, draw_distances, draw_outlines
 from sandmould.report.curves import runs_of, setting_tints, time_chart
 from sandmould.report.tables import Cell, Column, Table
-from sandmould.runs.columns import (
-    RUN,
-    SOLID_FRACTION,
-    TIME_S,
-    VIBRATION_TIME_S,
-)
+from sandmould.runs.columns import RUN, SOLID_FRACTION, TIME_S, VIBRATION_TIME_S
 from sandmould.runs.formatting import number, setting_text
 from sandmould.runs.templates import sentences
 from sandmould.scenario.pattern import PatternDrawing

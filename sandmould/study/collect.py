@@ -50,13 +50,7 @@ from sandmould.runs.columns import (
 from sandmould.runs.files import replaced
 from sandmould.runs.manifest import read_manifest
 from sandmould.runs.outcome import Outcome, RunOutcome
-from sandmould.runs.run_tables import (
-    PLACE,
-    RunTables,
-    problem_text,
-    read_costs,
-    read_tables,
-)
+from sandmould.runs.run_tables import PLACE, RunTables, problem_text, read_costs, read_tables
 from sandmould.scenario.reading import Origin, read_planned, validated
 from sandmould.statistics.agreement import (
     Compared,

@@ -14,13 +14,7 @@ import pandas as pd
 from sandmould.engines.registry import deck_reader, engine_module
 from sandmould.engines.session import EngineStop
 from sandmould.kinds.deck.own.columns import missing_columns
-from sandmould.kinds.deck.own.deck import (
-    OUTPUT,
-    RESTART_FILES,
-    check_unchanged,
-    names_used,
-    render,
-)
+from sandmould.kinds.deck.own.deck import OUTPUT, RESTART_FILES, check_unchanged, names_used, render
 from sandmould.kinds.deck.own.measures import measured, missing_dump
 from sandmould.kinds.deck.own.thermo import STEP, Thermo, read_thermo
 from sandmould.runs.outcome import Outcome, RunOutcome

@@ -11,12 +11,7 @@ from collections.abc import Iterable, Iterator
 from dataclasses import dataclass
 from pathlib import Path
 
-from sandmould.kinds.deck.own.deck import (
-    RESTART_FILES,
-    names_used,
-    render,
-    template_text,
-)
+from sandmould.kinds.deck.own.deck import RESTART_FILES, names_used, render, template_text
 from sandmould.scenario.own_deck import OwnDeck
 
 LARGEST_BYTES = 1_000_000
