@@ -28,17 +28,14 @@ def own_solid_fraction(position_m: Array, radius_m: Array, scene: Scene, grain_m
 
     It is the share of the places of a grid that lie in sand; one in two grains counts twice.
 
+    NaN where less than the space of some twenty grains is so far from all of these.
+
     Parameters
     ----------
     position_m : (n, d) float64, m
     radius_m : (n,) float64, m
     grain_m : float, m
         Diameter of the mass-median grain.
-
-    Returns
-    -------
-    float
-        NaN where less than the space of some twenty grains is so far from all of these.
     """
     if not len(position_m):
         return np.nan

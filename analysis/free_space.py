@@ -121,10 +121,7 @@ def free_measure_between(scene: Scene, edges_m: Array) -> Array:
 
     Exact but for round solids, whose edges are polygons of 128 sides with the same area.
 
-    Parameters
-    ----------
-    edges_m : (m + 1,) float64, m
-        Rising heights.
+    ``edges_m``, (m + 1,) float64, m: rising heights.
 
     Returns
     -------

@@ -222,10 +222,7 @@ def _slope_error(x: Array, residual: Array) -> float:
 def heap_slope(surface: Surface, width_m: float, axis_m: Array) -> Slope:
     """Slope of a heap under an outlet.
 
-    Parameters
-    ----------
-    axis_m : (d - 1,) float64, m
-        Where the sand fell; in 2D the crest beside it is looked for.
+    ``axis_m``, (d - 1,) float64, m: where the sand fell; in 2D the crest beside it is looked for.
     """
     if len(axis_m) == 1:
         crest, height_m = surface.height_m.argmax(), surface.height_m.max(initial=0.0)

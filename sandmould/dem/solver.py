@@ -279,10 +279,8 @@ class Solver:
     def advance(self, displacement_m: Floats) -> None:
         """Compute as many steps as displacements are given, less two.
 
-        Parameters
-        ----------
-        displacement_m : (steps + 2,) float64, m
-            Of the box along its direction, from one step before now to one step beyond the last.
+        ``displacement_m``, (steps + 2,) float64, m: of the box along its direction, from one step
+        before now to one step beyond the last.
 
         Raises
         ------
@@ -351,10 +349,7 @@ class Solver:
     def whole_step_velocities(self, acceleration_m_s2: float = 0.0) -> tuple[Floats, Floats]:
         """Velocities and spins at the time of the positions.
 
-        Parameters
-        ----------
-        acceleration_m_s2 : float
-            Of the box along its direction now, zero in the laboratory frame.
+        ``acceleration_m_s2``: of the box along its direction now, zero in the laboratory frame.
 
         Returns
         -------

@@ -133,10 +133,7 @@ class TableSolver(Solver):
     def advance_on_table(self, table: MountedTable, drive: TableDrive) -> Floats:
         """Compute steps in which the table moves freely.
 
-        Parameters
-        ----------
-        drive : TableDrive
-            Its length is the number of steps.
+        ``drive``: its length is the number of steps.
 
         Returns
         -------

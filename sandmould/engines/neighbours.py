@@ -18,9 +18,7 @@ def near_pairs(
 ) -> Iterator[tuple[NDArray[np.int64], NDArray[np.int64], Array]]:
     """Give every pair of centres not farther apart than the reach, once, in a few portions.
 
-    Parameters
-    ----------
-    position_m : (n, d) float64, m
+    ``position_m``: (n, d) float64, m.
 
     Yields
     ------

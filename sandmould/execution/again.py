@@ -21,10 +21,7 @@ from sandmould.study.plan.plan_files import read_run
 def forget(names: Sequence[str], results: Path) -> list[Path]:
     """Forget how runs ended, whether they failed or finished.
 
-    Parameters
-    ----------
-    names : sequence of str
-        Of runs: ``RUN``, ``STUDY/RUN`` or the path of a run's folder.
+    ``names``: those of runs, ``RUN``, ``STUDY/RUN`` or the path of a run's folder.
 
     Returns
     -------

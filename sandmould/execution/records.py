@@ -95,11 +95,8 @@ def record(path: Path, results: Path, figures: Sequence[str] = ()) -> Path:
 
     Runs that failed are named in the record.
 
-    Parameters
-    ----------
-    figures : sequence of str
-        Names of figures that a page shall show. Those that the record has are kept, too, as they
-        are drawn now.
+    ``figures``: names of figures that a page shall show. Those that the record has are kept, too,
+    as they are drawn now.
 
     Raises
     ------
@@ -160,10 +157,7 @@ def _keep_figures(drawn: Path, kept: Path, asked: Sequence[str]) -> None:
 def over_time(curves: pd.DataFrame, measure: str) -> pd.DataFrame:
     """What a study judges at ``TIMES`` moments of the vibration of each run.
 
-    Parameters
-    ----------
-    curves : DataFrame
-        One row a snapshot.
+    ``curves``: one row a snapshot.
 
     Returns
     -------

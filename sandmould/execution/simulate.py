@@ -68,10 +68,7 @@ def provenance(scenario: Any, *arguments: str) -> dict[str, Any]:
 def simulate(folder: Path, run: Run | None = None) -> int:
     """Compute a run in this process, or as one rank of several.
 
-    Parameters
-    ----------
-    run : Run, optional
-        Read from its folder unless given.
+    ``run``: read from its folder unless given.
 
     Returns
     -------

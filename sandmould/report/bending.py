@@ -148,16 +148,10 @@ def _tip(row: pd.Series[Any]) -> dict[str, float]:
 def paper_sentences(scenario: Scenario, collected: Collected, pictured_run: str) -> tuple[str, ...]:
     """What the paper states of its L, and whether the fillings of one setting say the same.
 
-    Parameters
-    ----------
-    pictured_run : str
-        Whose setting is judged, by the mean over its fillings.
+    ``pictured_run``: whose setting is judged, by the mean over its fillings.
 
-    Returns
-    -------
-    tuple of str
-        Empty under a scene that is none of the paper's: only an L that is filled in layers and
-        then vibrated is.
+    Empty under a scene that is none of the paper's: only an L that is filled in layers and then
+    vibrated is.
     """
     pattern = scenario.pattern
     is_l = pattern is not None and pattern.shape.kind == "l_shape"

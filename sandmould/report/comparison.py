@@ -195,10 +195,7 @@ def _value_text(stated: dict[str, Any], key: str) -> str:
 def read_comparison(folders: Sequence[Path]) -> SideBySide:
     """Read finished studies.
 
-    Parameters
-    ----------
-    folders : sequence of Path
-        Their folders of results, at least two. The objective of the first is compared.
+    ``folders``: their folders of results, at least two. The objective of the first is compared.
 
     Raises
     ------

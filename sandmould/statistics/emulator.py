@@ -39,9 +39,7 @@ class Emulator:
     def at(self, points: Array) -> tuple[Array, Array]:
         """Mean and standard error of the mean at points.
 
-        Parameters
-        ----------
-        points : (n, d) float64
+        ``points``: (n, d) float64.
 
         Returns
         -------
@@ -54,9 +52,7 @@ class Emulator:
     def draws(self, points: Array, number: int, seed: int) -> Array:
         """Draw surfaces that the runs leave possible.
 
-        Parameters
-        ----------
-        points : (n, d) float64
+        ``points``: (n, d) float64.
 
         Returns
         -------

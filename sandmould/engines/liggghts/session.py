@@ -43,10 +43,7 @@ class LiggghtsSession(DeckSession):
     ) -> None:
         """Start LIGGGHTS on a deck, afresh or from a checkpoint.
 
-        Parameters
-        ----------
-        log : Path
-            LIGGGHTS's own log; files that are read at once lie beside it.
+        ``log``: LIGGGHTS's own log; files that are read at once lie beside it.
 
         Raises
         ------

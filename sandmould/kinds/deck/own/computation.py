@@ -37,10 +37,7 @@ def compute(scenario: OwnDeck, folder: Path, run: str, study: str) -> Computed:
     A restart file that cannot be gone on from is left for the one before it, and that for the
     beginning.
 
-    Parameters
-    ----------
-    folder : Path
-        The run's, with its deck where that is rendered; it runs in ``work/output``.
+    ``folder``: the run's, with its deck where that is rendered; it runs in ``work/output``.
 
     Raises
     ------

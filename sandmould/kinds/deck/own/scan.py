@@ -66,10 +66,7 @@ class Finding:
 def to_read(scenarios: Iterable[OwnDeck]) -> list[str]:
     """List the lines to look at in templates, further files, and decks as they are rendered.
 
-    Parameters
-    ----------
-    scenarios : iterable of OwnDeck
-        One of each point of a study; all can be rendered.
+    ``scenarios``: one of each point of a study; all can be rendered.
 
     Returns
     -------
