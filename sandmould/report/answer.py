@@ -210,7 +210,7 @@ def _motion_figures(drive: BoxDrive | None) -> list[KeyNumber]:
         KeyNumber(
             f"{number(1e3 * drive.displacement_m)} mm",
             "amplitude (half of peak to peak)",
-            f"{number(1e3 * drive.end_to_end_m)} mm end to end",
+            f"{number(2e3 * drive.displacement_m)} mm end to end",
         ),
         KeyNumber(
             f"{number(drive.acceleration_g)} g",

@@ -120,7 +120,10 @@ def write_report(study_folder: Path, out: Path) -> None:
     with replaced(out) as partial:
         partial.write_text(text, encoding="utf-8")
         write_figures(study_folder / FIGURES, environment, figures)
-        _write_beside(study_folder / SPHERES, beside)
+        shutil.rmtree(study_folder / SPHERES, ignore_errors=True)
+        for name, script in beside.items():
+            (study_folder / SPHERES).mkdir(exist_ok=True)
+            (study_folder / SPHERES / name).write_text(script, encoding="utf-8")
     write_text(study_folder / VERDICT_FILE, f"{first}\n")
 
 
@@ -313,14 +316,6 @@ def _first_screen(
     owner = owner_of(page.study_folder)
     after = with_file(steps, owner, shipped_name(owner), page.study_folder.name)
     return FirstScreen(headline, is_sound, figures, table, grounds, after)
-
-
-def _write_beside(folder: Path, scripts: Mapping[str, str]) -> None:
-    """Write the folder of scripts anew; none where there are none."""
-    shutil.rmtree(folder, ignore_errors=True)
-    for name, text in scripts.items():
-        folder.mkdir(exist_ok=True)
-        (folder / name).write_text(text, encoding="utf-8")
 
 
 def _beside_mode(page: Findings[Any], mode: BedMode | None) -> list[str]:

@@ -12,7 +12,7 @@ import numpy as np
 import pandas as pd
 from numpy.typing import NDArray
 
-from sandmould.analysis.layers import layer_table
+from sandmould.analysis.layers import tube_shares
 from sandmould.analysis.plots import LAYER_COLOURS
 from sandmould.bad_input import BadInputError
 from sandmould.drawing import figures
@@ -293,10 +293,10 @@ def _layer_conclusion(snapshots: Sequence[Snapshot], scenario: Scenario) -> str:
     if not snapshots or not scenario.scene.bores:
         return ""
     bore, last = scenario.scene.bores[0], snapshots[-1]
-    table = layer_table(last.position_m, last.radius_m, last.layer, bore)
+    found = tube_shares(last.position_m, last.radius_m, last.layer, bore)
     shares = [
         f"layer {layer} ({100 * share:.0f} %)"
-        for share, layer in sorted(zip(table.tube_share, table.layer, strict=True), reverse=True)
+        for share, layer in sorted(zip(found.values(), found, strict=True), reverse=True)
         if share >= 0.05
     ]
     name = bore.name.replace("_", " ")

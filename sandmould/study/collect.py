@@ -53,8 +53,8 @@ from sandmould.runs.outcome import Outcome, RunOutcome
 from sandmould.runs.run_tables import PLACE, RunTables, problem_text, read_costs, read_tables
 from sandmould.scenario.reading import Origin, read_planned, validated
 from sandmould.statistics.agreement import (
+    COLUMNS,
     Compared,
-    agreement_table,
     compare_keys,
     compare_pair,
     sweep_part,
@@ -111,7 +111,7 @@ def collect(study_folder: Path) -> None:
     tables = {
         SUMMARY: sweep.summary,
         CURVES: sweep.curves,
-        "agreement.tsv": agreement_table(compared),
+        "agreement.tsv": pd.DataFrame([c.row() for c in compared], columns=list(COLUMNS)),
     }
     if len(sweep.summary) < len(gathered.summary):
         parts = gathered.summary, gathered.curves

@@ -136,7 +136,8 @@ class Screen:
             self._print(words)
         all_ended = self._watch.look()
         for run in all_ended:
-            self._learn(run.run)
+            wall_s = computed_wall_s(self._folders[run.run])
+            self._time_left_known(begun=True).learn(run.run, wall_s)
         # Runs tell of a fill that failed.
         ended = [run for run in all_ended if run.run not in self._fills]
         for run in ended:
@@ -164,9 +165,6 @@ class Screen:
             self._print(f"and {len(untold) - most} more failed: the report lists them")
         if self.failures:
             self._print("A failed run is computed once more by: sandmould again RUN")
-
-    def _learn(self, run: str) -> None:
-        self._time_left_known(begun=True).learn(run, computed_wall_s(self._folders[run]))
 
     def _end(self, run: Ended) -> None:
         self._so_far_known().add([run.run])

@@ -119,11 +119,6 @@ def _wrong_end(scenario: OwnDeck, thermo: Thermo, went_on: bool) -> str:
     return f"{said}: state the steps that the deck runs, or none"
 
 
-def write_series(scenario: OwnDeck, work: Path) -> None:
-    """Write ``series.tsv``."""
-    series(scenario, work).to_csv(work / "series.tsv", sep="\t", index=False)
-
-
 def series(scenario: OwnDeck, work: Path) -> pd.DataFrame:
     """Time in s, the measures by name, and the whole log beside them."""
     table = read_thermo(_logs(work)).table
