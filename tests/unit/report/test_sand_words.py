@@ -10,7 +10,8 @@ import pytest
 
 from sandmould.engines.snapshot import Snapshot
 from sandmould.report.pictured_runs import pictured_runs
-from sandmould.report.sand import _density_conclusion, _role_text
+from sandmould.report.sand import _role_text
+from sandmould.runs.templates import worded
 from sandmould.statistics.verdict import Verdict, compare_settings
 
 FILL = "tube_fill_fraction"
@@ -60,4 +61,4 @@ def test_of_the_best_setting_the_run_in_the_middle_is_pictured(tmp_path: Path) -
     [((1791.2, 1790.9), "stayed at 1\u202f791 kg"), ((1791.0, 1700.0), "fell from 1\u202f791 to")],
 )
 def test_a_density_that_shows_no_change_stayed(densities: tuple[float, float], said: str) -> None:
-    assert said in _density_conclusion(densities)
+    assert said in worded("density_course.j2", kg_m3=densities)
