@@ -373,9 +373,7 @@ def _with_clock(table: pd.DataFrame) -> pd.DataFrame:
     if missing:
         raise ValueError(f"no column {', '.join(missing)}")
     times = {name: pd.to_numeric(table[name]) for name in (TIME_S, VIBRATION_TIME_S)}
-    shaken_s = times[VIBRATION_TIME_S]
-    # older tables say -1 where nothing had vibrated yet
-    return table.assign(**times | {VIBRATION_TIME_S: shaken_s.where(shaken_s >= 0)})
+    return table.assign(**times)
 
 
 def read_provenance(folder: Path) -> dict[str, Any]:

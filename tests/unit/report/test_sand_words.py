@@ -13,6 +13,7 @@ from sandmould.report.pictured_runs import pictured_runs
 from sandmould.report.sand import _role_text
 from sandmould.runs.templates import worded
 from sandmould.statistics.verdict import Verdict, compare_settings
+from tests.snapshots import write_snapshots
 
 FILL = "tube_fill_fraction"
 ONE = np.ones(1)
@@ -47,8 +48,7 @@ def test_of_the_best_setting_the_run_in_the_middle_is_pictured(tmp_path: Path) -
          for run, (f_hz, fill) in fills.items()]
     )  # fmt: skip
     for run in fills:
-        (tmp_path / "runs" / run / "snapshots").mkdir(parents=True)
-        STILL.save(tmp_path / "runs" / run / "snapshots" / "000000.npz")
+        write_snapshots(tmp_path / "runs" / run, [STILL])
     verdict = compare_settings(table, ["f_hz"], FILL)
     assert pictured_runs(tmp_path, table, verdict) == {"best": "d", "worst": "b"}
     assert _role_text("best", verdict, table) == (
