@@ -6,11 +6,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from sandmould.analysis.tube_fill import sand_in_bore
-from sandmould.geometry.geometry import Array, Bore
+from sandmould.arrays import Centres, Radii
+from sandmould.geometry.geometry import Bore
 
 
 def tube_shares(
-    position_m: Array, radius_m: Array, layer: NDArray[np.int64], bore: Bore
+    position_m: Centres, radius_m: Radii, layer: NDArray[np.int64], bore: Bore
 ) -> dict[int, float]:
     """Share of the sand in a tube that each layer of fill has brought, by its number.
 
@@ -18,8 +19,6 @@ def tube_shares(
 
     Parameters
     ----------
-    position_m : (n, d) float64, m
-    radius_m : (n,) float64, m
     layer : (n,) int64
     """
     number, row = np.unique(layer, return_inverse=True)
@@ -28,7 +27,7 @@ def tube_shares(
     return dict(zip(number.tolist(), (sand / whole).tolist(), strict=True)) if whole else {}
 
 
-def mixing_index(position_m: Array, layer: NDArray[np.int64]) -> float:
+def mixing_index(position_m: Centres, layer: NDArray[np.int64]) -> float:
     """Mixing of the layers: 0 apart, 1 as if the grains had been dealt out at random.
 
     Let u be the share of unlike grains (of another layer) among the nearest neighbours of a grain,
@@ -39,7 +38,6 @@ def mixing_index(position_m: Array, layer: NDArray[np.int64]) -> float:
 
     Parameters
     ----------
-    position_m : (n, d) float64, m
     layer : (n,) int64
     """
     n, dimension = position_m.shape

@@ -8,6 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from sandmould.analysis.intersections import depth_in_polygon_m, disc_polygon_m2, sphere_prism_m3
+from sandmould.arrays import Centres, Radii
 from sandmould.geometry.geometry import Array, Bore
 
 
@@ -25,16 +26,11 @@ class TubeFill:
     """Depth behind the mouth that the deepest grain edge has reached; 0 when empty."""
 
 
-def tube_fill(position_m: Array, radius_m: Array, bore: Bore) -> TubeFill:
+def tube_fill(position_m: Centres, radius_m: Radii, bore: Bore) -> TubeFill:
     """Measure the sand in a bore, cut grains counted by their exact parts.
 
     The walls of the tube are not part of the bore, so a grain that rests on the outside of a wall
     never counts. Overlaps of two grains count twice.
-
-    Parameters
-    ----------
-    position_m : (n, d) float64, m
-    radius_m : (n,) float64, m
     """
     part = sand_in_bore(position_m, radius_m, bore)
     depth_m, across_m = bore.local(position_m)
@@ -51,13 +47,8 @@ def tube_fill(position_m: Array, radius_m: Array, bore: Bore) -> TubeFill:
     )
 
 
-def sand_in_bore(position_m: Array, radius_m: Array, bore: Bore) -> Array:
+def sand_in_bore(position_m: Centres, radius_m: Radii, bore: Bore) -> Array:
     """Part of each grain inside the bore.
-
-    Parameters
-    ----------
-    position_m : (n, d) float64, m
-    radius_m : (n,) float64, m
 
     Returns
     -------
