@@ -17,14 +17,7 @@ from sandmould.report.kinds.registry import report_of
 from sandmould.report.pictured_runs import Heap
 from sandmould.report.tables import Cell, Column, Table
 from sandmould.runs.columns import CPU_S, RUN, total_s
-from sandmould.runs.formatting import (
-    name_of,
-    number,
-    seconds,
-    titled,
-    unit_of,
-    with_margin,
-)
+from sandmould.runs.formatting import name_of, number, seconds, titled, unit_of, with_margin
 from sandmould.runs.templates import sentences, worded
 from sandmould.statistics.calibration.sands import Calibrated, CalibratedSand
 from sandmould.statistics.emulator import TooFewRunsError, fit_emulator

@@ -52,13 +52,7 @@ from sandmould.runs.manifest import read_manifest
 from sandmould.runs.outcome import Outcome, RunOutcome
 from sandmould.runs.run_tables import PLACE, RunTables, problem_text, read_costs, read_tables
 from sandmould.scenario.reading import Origin, read_planned, validated
-from sandmould.statistics.agreement import (
-    COLUMNS,
-    Compared,
-    compare_keys,
-    compare_pair,
-    sweep_part,
-)
+from sandmould.statistics.agreement import COLUMNS, Compared, compare_keys, compare_pair, sweep_part
 from sandmould.study.plan.plan_files import CHECKS, CURVES, STUDY_FILE, SUMMARY
 
 NO_OUTCOME = "no outcome written"
