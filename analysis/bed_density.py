@@ -31,10 +31,7 @@ def own_solid_fraction(position_m: Centres, radius_m: Radii, scene: Scene, grain
 
     NaN where less than the space of some twenty grains is so far from all of these.
 
-    Parameters
-    ----------
-    grain_m : float, m
-        Diameter of the mass-median grain.
+    ``grain_m``, float, m: diameter of the mass-median grain.
     """
     if not len(position_m):
         return np.nan

@@ -65,10 +65,8 @@ def cavity_fill(
     dense as the bed. There a grain cut by the cavity's border is shared out among slabs as if it
     were whole.
 
-    Parameters
-    ----------
-    slab_m : float, m
-        Thickness of the slabs; changed so that a whole number of them makes the cavity's length.
+    ``slab_m``, float, m: thickness of the slabs; changed so that a whole number of them makes the
+    cavity's length.
     """
     corners_m = cavity.space.corners()
     reach_m = float(radius_m.max(initial=0.0))

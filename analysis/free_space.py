@@ -90,10 +90,7 @@ def part_in_solid(
 ) -> Array:
     """Measure of the part of each disc or sphere that lies in a solid, or in a space of its shape.
 
-    Parameters
-    ----------
-    walls : tuple of Wall, optional
-        What of a 2D solid or an upright block lies behind them does not count.
+    ``walls``: what of a 2D solid or an upright block lies behind them does not count.
 
     Returns
     -------

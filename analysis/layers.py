@@ -17,9 +17,7 @@ def tube_shares(
 
     They add to 1; there are none where there is no sand.
 
-    Parameters
-    ----------
-    layer : (n,) int64
+    ``layer``: (n,) int64.
     """
     number, row = np.unique(layer, return_inverse=True)
     sand = np.bincount(row, weights=sand_in_bore(position_m, radius_m, bore))
@@ -36,9 +34,7 @@ def mixing_index(position_m: Centres, layer: NDArray[np.int64]) -> float:
     ``u/u_r``: layers just filled score the small share of neighbours across their interfaces, and
     an ordered arrangement can pass 1. With but one layer there is nothing to mix: 0.
 
-    Parameters
-    ----------
-    layer : (n,) int64
+    ``layer``: (n,) int64.
     """
     n, dimension = position_m.shape
     count = np.unique(layer, return_counts=True)[1].astype(np.float64)

@@ -41,10 +41,7 @@ def solid_fraction_profile(
     two grains counts twice. Above the bed's surface the fraction falls to zero: nothing corrects
     for it.
 
-    Parameters
-    ----------
-    edges_m : (m + 1,) float64, m
-        Rising heights.
+    ``edges_m``, (m + 1,) float64, m: rising heights.
 
     Raises
     ------
@@ -88,10 +85,8 @@ def bed_surface_height_m(
     height is that of the surface where there is sand. It lies above the mean of all surface
     grains' tops, the more so the wider the columns.
 
-    Parameters
-    ----------
-    column_width_m : float, m, optional
-        Four times the largest radius unless given; stretched to a whole number of columns.
+    ``column_width_m``, float, m: four times the largest radius unless given; stretched to a whole
+    number of columns.
 
     Returns
     -------

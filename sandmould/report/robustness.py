@@ -61,8 +61,6 @@ def robustness_pages(
 
     Parameters
     ----------
-    study_folder : Path
-    study : Study
     collected : Collected
         Of all runs.
     scenario : Scenario

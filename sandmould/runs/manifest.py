@@ -65,7 +65,6 @@ def write_manifest(
 
     Parameters
     ----------
-    step : str
     origin : mapping, optional
         Provenance of what was computed.
     cost : mapping, optional
