@@ -46,6 +46,7 @@ from sandmould.runs.columns import (
     TIME_S,
     VIBRATION_TIME_S,
     WALL_S,
+    finished,
 )
 from sandmould.runs.files import replaced
 from sandmould.runs.manifest import read_manifest
@@ -376,3 +377,20 @@ def read_provenance(folder: Path) -> dict[str, Any]:
         return read_manifest(folder).get("origin", {})
     except (OSError, ValueError):
         return {}
+
+
+def failed_runs(study_folder: Path) -> None:
+    """Fail loudly when a run of the study failed.
+
+    Raises
+    ------
+    SystemExit
+        Naming each run that did not finish, with its outcome and what was said of it.
+    """
+    summary = read_summary(study_folder)
+    failed = summary[~finished(summary)].to_dict("records")
+    if failed:
+        lines = [f"  {row[RUN]}: {row[OUTCOME]}. {row[DETAIL]}".rstrip() for row in failed]
+        again = "A failed run is computed once more by: sandmould again RUN"
+        said = "\n".join([f"{len(failed)} of {len(summary)} runs did not finish:", *lines, again])
+        raise SystemExit(said)

@@ -10,13 +10,13 @@ import pytest
 import yaml
 
 from sandmould.definition.study import Objective
-from sandmould.execution.check import failed_runs
 from sandmould.kinds.sand.kind import SandStudy
 from sandmould.runs.outcome import Outcome, RunOutcome
 from sandmould.runs.run_tables import PLACE, read_tables
 from sandmould.study.collect import (
     NO_OUTCOME,
     collect,
+    failed_runs,
     gather,
     read_collected,
     read_provenance,
