@@ -28,12 +28,12 @@ from sandmould.runs.formatting import number, setting_text
 from sandmould.runs.templates import sentences
 from sandmould.scenario.pattern import PatternDrawing
 from sandmould.scenario.scenario import Scenario
+from sandmould.statistics.decision import TIP
 from sandmould.statistics.evidence import left_out, usable_values
 from sandmould.statistics.settings import group_settings, setting_of
 from sandmould.statistics.verdict import Verdict
 from sandmould.study.collect import Collected
 
-TIP = "pattern_tip_deflection_m"
 RECOVERED = "pattern_tip_recovered_m"
 _RECOVERS = 0.02
 """Share of the deflection that must come back before the page says so."""
