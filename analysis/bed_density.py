@@ -13,6 +13,7 @@ from scipy.ndimage import maximum_filter, minimum_filter
 from scipy.spatial import cKDTree
 
 from sandmould.analysis.tube_fill import lies_in_bore
+from sandmould.arrays import Centres, Radii
 from sandmould.geometry.geometry import Array, Scene
 
 PLACES = 40_000
@@ -23,22 +24,14 @@ LEAST_GRAINS = 20
 """Squares or cubes round a grain that the undisturbed bed must hold to tell anything."""
 
 
-def own_solid_fraction(position_m: Array, radius_m: Array, scene: Scene, grain_m: float) -> float:
+def own_solid_fraction(position_m: Centres, radius_m: Radii, scene: Scene, grain_m: float) -> float:
     """Solid fraction of the bed at least a grain away from walls, solids and the sand's surface.
 
     It is the share of the places of a grid that lie in sand; one in two grains counts twice.
 
-    Parameters
-    ----------
-    position_m : (n, d) float64, m
-    radius_m : (n,) float64, m
-    grain_m : float, m
-        Diameter of the mass-median grain.
+    NaN where less than the space of some twenty grains is so far from all of these.
 
-    Returns
-    -------
-    float
-        NaN where less than the space of some twenty grains is so far from all of these.
+    ``grain_m``, float, m: diameter of the mass-median grain.
     """
     if not len(position_m):
         return np.nan
@@ -61,17 +54,12 @@ def own_solid_fraction(position_m: Array, radius_m: Array, scene: Scene, grain_m
 
 
 def buried_places(
-    position_m: Array, radius_m: Array, depth_m: float, cell_m: float
+    position_m: Centres, radius_m: Radii, depth_m: float, cell_m: float
 ) -> tuple[Array, NDArray[np.bool_]]:
     """Places among all grains, (..., d) float64, m, and which lie so deep below the sand.
 
     The sand's surface at a place is the lowest within that depth of what the highest grain within
     half of it makes it.
-
-    Parameters
-    ----------
-    position_m : (n, d) float64, m
-    radius_m : (n,) float64, m
     """
     dimension = position_m.shape[1]
     if not len(position_m):

@@ -13,6 +13,7 @@ from scipy.spatial import cKDTree
 from sandmould.analysis.free_space import part_in_solid, polygon_below_m2
 from sandmould.analysis.intersections import disc_segment_m2, sphere_cap_m3
 from sandmould.analysis.mesh_parts import mesh_below_m3
+from sandmould.arrays import Centres, Radii
 from sandmould.geometry.geometry import Array, Block, Cavity, Scene, distance_within
 from sandmould.geometry.mesh import TriangleMesh
 from sandmould.geometry.outline import Outline
@@ -53,7 +54,7 @@ class CavityVoids:
 
 
 def cavity_fill(
-    position_m: Array, radius_m: Array, cavity: Cavity, slab_m: float, bed_fraction: float
+    position_m: Centres, radius_m: Radii, cavity: Cavity, slab_m: float, bed_fraction: float
 ) -> CavityFill:
     """Measure the sand in a cavity, cut grains counted by the part that lies in it.
 
@@ -64,12 +65,8 @@ def cavity_fill(
     dense as the bed. There a grain cut by the cavity's border is shared out among slabs as if it
     were whole.
 
-    Parameters
-    ----------
-    position_m : (n, d) float64, m
-    radius_m : (n,) float64, m
-    slab_m : float, m
-        Thickness of the slabs; changed so that a whole number of them makes the cavity's length.
+    ``slab_m``, float, m: thickness of the slabs; changed so that a whole number of them makes the
+    cavity's length.
     """
     corners_m = cavity.space.corners()
     reach_m = float(radius_m.max(initial=0.0))
@@ -128,7 +125,7 @@ def _axes_with_last(direction: Array) -> Array:
 
 
 def cavity_voids(
-    position_m: Array, radius_m: Array, cavity: Cavity, scene: Scene, grain_m: float
+    position_m: Centres, radius_m: Radii, cavity: Cavity, scene: Scene, grain_m: float
 ) -> CavityVoids:
     """Find the voids of a cavity that are larger than a grain.
 
@@ -137,11 +134,6 @@ def cavity_voids(
     belong to one void where such grains would overlap. It is sought on a grid of 16 (2D) or 8 (3D)
     cells along a grain. So its border is known to about half a cell, and one that is wider than a
     grain by less than a cell's diagonal, 9 % of it in 2D and 22 % in 3D, may be passed over.
-
-    Parameters
-    ----------
-    position_m : (n, d) float64, m
-    radius_m : (n,) float64, m
     """
     grid = _void_grid(cavity, grain_m)
     reach_m = 0.5 * grain_m * (1.0 - _ROUND_OFF)

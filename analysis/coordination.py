@@ -7,6 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from sandmould.arrays import Centres, Radii
 from sandmould.engines.neighbours import touching_pairs
 from sandmould.geometry.geometry import Array, Scene, Solid, Wall, distance_within
 
@@ -34,7 +35,7 @@ class ContactCounts:
 
 
 def contacts(
-    position_m: Array, radius_m: Array, scene: Scene | None = None, tolerance_m: float = 0.0
+    position_m: Centres, radius_m: Radii, scene: Scene | None = None, tolerance_m: float = 0.0
 ) -> ContactCounts:
     """Count the contacts: overlaps deeper than minus the tolerance.
 
@@ -44,8 +45,6 @@ def contacts(
 
     Parameters
     ----------
-    position_m : (n, d) float64, m
-    radius_m : (n,) float64, m
     scene : Scene, optional
         Walls and solids; without it only contacts between grains are counted.
     tolerance_m : float, m, optional

@@ -8,6 +8,7 @@ import numpy as np
 
 from sandmould.analysis.free_space import free_part
 from sandmould.analysis.intersections import disc_lens_m2, sphere_lens_m3
+from sandmould.arrays import Centres, Radii
 from sandmould.engines.neighbours import near_pairs
 from sandmould.geometry.geometry import Array, Scene
 
@@ -25,8 +26,8 @@ class ApparentDensity:
 
 
 def apparent_density(
-    position_m: Array,
-    radius_m: Array,
+    position_m: Centres,
+    radius_m: Radii,
     density_kg_m3: float,
     scene: Scene | None = None,
     control_radius_m: float | None = None,
@@ -41,8 +42,6 @@ def apparent_density(
 
     Parameters
     ----------
-    position_m : (n, d) float64, m
-    radius_m : (n,) float64, m
     density_kg_m3 : float, kg/m3
         Of the grains' own material.
     scene : Scene, optional

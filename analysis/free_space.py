@@ -23,6 +23,7 @@ from sandmould.analysis.intersections import (
     sphere_prism_m3,
 )
 from sandmould.analysis.mesh_parts import mesh_below_m3, sphere_mesh_m3
+from sandmould.arrays import Centres, Radii
 from sandmould.geometry.geometry import Array, Block, Scene, Solid, Wall
 from sandmould.geometry.mesh import TriangleMesh
 from sandmould.geometry.outline import Outline
@@ -55,13 +56,8 @@ class _Prism:
         return _cuboid_below_m3(size_m, self.axes[:, 2], height_m - self.origin_m[2])
 
 
-def free_part(position_m: Array, radius_m: Array, scene: Scene) -> Array:
+def free_part(position_m: Centres, radius_m: Radii, scene: Scene) -> Array:
     """Measure of the part of each disc or sphere that lies in free space.
-
-    Parameters
-    ----------
-    position_m : (n, d) float64, m
-    radius_m : (n,) float64, m
 
     Returns
     -------
@@ -90,16 +86,11 @@ def free_part(position_m: Array, radius_m: Array, scene: Scene) -> Array:
 
 
 def part_in_solid(
-    position_m: Array, radius_m: Array, solid: Solid, walls: tuple[Wall, ...] = ()
+    position_m: Centres, radius_m: Radii, solid: Solid, walls: tuple[Wall, ...] = ()
 ) -> Array:
     """Measure of the part of each disc or sphere that lies in a solid, or in a space of its shape.
 
-    Parameters
-    ----------
-    position_m : (n, d) float64, m
-    radius_m : (n,) float64, m
-    walls : tuple of Wall, optional
-        What of a 2D solid or an upright block lies behind them does not count.
+    ``walls``: what of a 2D solid or an upright block lies behind them does not count.
 
     Returns
     -------
@@ -121,10 +112,7 @@ def free_measure_between(scene: Scene, edges_m: Array) -> Array:
 
     Exact but for round solids, whose edges are polygons of 128 sides with the same area.
 
-    Parameters
-    ----------
-    edges_m : (m + 1,) float64, m
-        Rising heights.
+    ``edges_m``, (m + 1,) float64, m: rising heights.
 
     Returns
     -------

@@ -94,9 +94,7 @@ def _next(values: Array) -> Array:
 def polygon_area_m2(polygon_m: Array) -> float:
     """Area of a simple polygon, positive when its vertices run counter-clockwise.
 
-    Parameters
-    ----------
-    polygon_m : (k, 2) float64, m
+    ``polygon_m``: (k, 2) float64, m.
     """
     x, y = polygon_m[:, 0], polygon_m[:, 1]
     return float(0.5 * np.sum(x * _next(y) - _next(x) * y))

@@ -20,6 +20,7 @@ from sandmould.analysis.bed_density import buried_places
 from sandmould.analysis.free_space import free_part
 from sandmould.analysis.intersections import disc_lens_m2, sphere_lens_m3
 from sandmould.analysis.tube_fill import lies_in_bore
+from sandmould.arrays import Centres, Radii
 from sandmould.geometry.geometry import Array, Scene, Solid, Wall, distance_within
 
 LOOSE = 0.9
@@ -83,7 +84,9 @@ class LooseSand:
     field: LooseField
 
 
-def find_loose_sand(position_m: Array, radius_m: Array, scene: Scene, grain_m: float) -> LooseSand:
+def find_loose_sand(
+    position_m: Centres, radius_m: Radii, scene: Scene, grain_m: float
+) -> LooseSand:
     """Find the zones of loose sand.
 
     Places are the cells of a grid that lie in free space and at least a ball's radius below the
@@ -91,8 +94,6 @@ def find_loose_sand(position_m: Array, radius_m: Array, scene: Scene, grain_m: f
 
     Parameters
     ----------
-    position_m : (n, d) float64, m
-    radius_m : (n,) float64, m
     scene : Scene
         Its walls must close the box on every side; in 3D they must be upright or level.
     grain_m : float, m

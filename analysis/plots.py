@@ -48,10 +48,7 @@ class SceneSection:
 def scene_section(scene: Scene, height_m: float, cut_m: float | None = None) -> SceneSection:
     """Outlines of box, solids, bores and cavities in the plane shown.
 
-    Parameters
-    ----------
-    cut_m : float, m, optional
-        In 3D, y of the plane shown; the middle of the box unless given.
+    ``cut_m``, float, m: in 3D, y of the plane shown; the middle of the box unless given.
 
     Raises
     ------

@@ -8,6 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from sandmould.arrays import Centres, Radii
 from sandmould.engines.neighbours import touching_pairs
 
 Array = NDArray[np.float64]
@@ -70,14 +71,8 @@ class Surface:
     """(m,) float64, m; 0 where there is no sand."""
 
 
-def lying(position_m: Array, radius_m: Array, floor_m: float) -> NDArray[np.bool_]:
-    """Find the grains that hang together with the floor: those that still fall do not, (n,) bool.
-
-    Parameters
-    ----------
-    position_m : (n, d) float64, m
-    radius_m : (n,) float64, m
-    """
+def lying(position_m: Centres, radius_m: Radii, floor_m: float) -> NDArray[np.bool_]:
+    """Find grains that hang together with the floor: those that still fall do not, (n,) bool."""
     from scipy.sparse import coo_array
     from scipy.sparse.csgraph import connected_components
 
@@ -95,14 +90,12 @@ def lying(position_m: Array, radius_m: Array, floor_m: float) -> NDArray[np.bool
 
 
 def free_surface(
-    position_m: Array, radius_m: Array, low_m: Array, high_m: Array, floor_m: float
+    position_m: Centres, radius_m: Radii, low_m: Array, high_m: Array, floor_m: float
 ) -> Surface:
     """Find the upper envelope of grains over a part of the floor.
 
     Parameters
     ----------
-    position_m : (n, d) float64, m
-    radius_m : (n,) float64, m
     low_m, high_m : (d - 1,) float64, m
         Bounds of the part.
     floor_m : float, m
@@ -222,10 +215,7 @@ def _slope_error(x: Array, residual: Array) -> float:
 def heap_slope(surface: Surface, width_m: float, axis_m: Array) -> Slope:
     """Slope of a heap under an outlet.
 
-    Parameters
-    ----------
-    axis_m : (d - 1,) float64, m
-        Where the sand fell; in 2D the crest beside it is looked for.
+    ``axis_m``, (d - 1,) float64, m: where the sand fell; in 2D the crest beside it is looked for.
     """
     if len(axis_m) == 1:
         crest, height_m = surface.height_m.argmax(), surface.height_m.max(initial=0.0)

@@ -12,10 +12,7 @@ from sandmould.geometry.outline import Outline, signed_area_m2
 def solid_sections(solid: Solid, cut_m: float) -> list[Array]:
     """Polygons in which the plane shown cuts a solid.
 
-    Parameters
-    ----------
-    cut_m : float, m
-        In 3D, y of the plane of x and z; of no meaning in 2D.
+    ``cut_m``, float, m: in 3D, y of the plane of x and z; of no meaning in 2D.
 
     Returns
     -------
@@ -34,9 +31,7 @@ def solid_sections(solid: Solid, cut_m: float) -> list[Array]:
 def convex_section(corners_m: Array, cut_m: float) -> Array:
     """Polygon in which the plane shown cuts a convex body.
 
-    Parameters
-    ----------
-    corners_m : (m, d) float64, m
+    ``corners_m``: (m, d) float64, m.
 
     Returns
     -------

@@ -9,6 +9,7 @@ import numpy as np
 from sandmould.analysis.coordination import contacts
 from sandmould.analysis.free_space import box_section, free_measure_between
 from sandmould.analysis.intersections import disc_segment_m2, sphere_cap_m3
+from sandmould.arrays import Centres, Radii
 from sandmould.geometry.geometry import Array, Scene
 
 
@@ -32,7 +33,7 @@ class SolidFractionProfile:
 
 
 def solid_fraction_profile(
-    position_m: Array, radius_m: Array, scene: Scene, edges_m: Array
+    position_m: Centres, radius_m: Radii, scene: Scene, edges_m: Array
 ) -> SolidFractionProfile:
     """Solid fraction of each slab between successive heights.
 
@@ -40,12 +41,7 @@ def solid_fraction_profile(
     two grains counts twice. Above the bed's surface the fraction falls to zero: nothing corrects
     for it.
 
-    Parameters
-    ----------
-    position_m : (n, d) float64, m
-    radius_m : (n,) float64, m
-    edges_m : (m + 1,) float64, m
-        Rising heights.
+    ``edges_m``, (m + 1,) float64, m: rising heights.
 
     Raises
     ------
@@ -64,14 +60,9 @@ def solid_fraction_profile(
 
 
 def mean_solid_fraction(
-    position_m: Array, radius_m: Array, scene: Scene, low_m: float, high_m: float
+    position_m: Centres, radius_m: Radii, scene: Scene, low_m: float, high_m: float
 ) -> float:
     """Solid fraction of the box between two heights; see :func:`solid_fraction_profile`.
-
-    Parameters
-    ----------
-    position_m : (n, d) float64, m
-    radius_m : (n,) float64, m
 
     Raises
     ------
@@ -84,7 +75,7 @@ def mean_solid_fraction(
 
 
 def bed_surface_height_m(
-    position_m: Array, radius_m: Array, scene: Scene, column_width_m: float | None = None
+    position_m: Centres, radius_m: Radii, scene: Scene, column_width_m: float | None = None
 ) -> float:
     """Height of the bed's surface: the mean over columns of the highest grain top.
 
@@ -94,12 +85,8 @@ def bed_surface_height_m(
     height is that of the surface where there is sand. It lies above the mean of all surface
     grains' tops, the more so the wider the columns.
 
-    Parameters
-    ----------
-    position_m : (n, d) float64, m
-    radius_m : (n,) float64, m
-    column_width_m : float, m, optional
-        Four times the largest radius unless given; stretched to a whole number of columns.
+    ``column_width_m``, float, m: four times the largest radius unless given; stretched to a whole
+    number of columns.
 
     Returns
     -------

@@ -15,6 +15,8 @@ def transfer(
 ) -> float:
     """Amplitude of a force at one frequency over that of a rigid bed, from its second half.
 
+    NaN where less than one period is left to fit.
+
     Parameters
     ----------
     time_s : (n,) float64, s
@@ -22,11 +24,6 @@ def transfer(
     force_n : (n,) float64, N
     rigid_n : float, N
         Mass of the bed times the amplitude of its box's acceleration.
-
-    Returns
-    -------
-    float
-        NaN where less than one period is left to fit.
     """
     late = time_s >= 0.5 * (time_s[0] + time_s[-1])
     if np.ptp(time_s[late]) * frequency_hz < 1.0:

@@ -3,12 +3,12 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from itertools import pairwise
 
 import numpy as np
 from numpy.typing import NDArray
 
 from sandmould.analysis.intersections import depth_in_polygon_m, disc_polygon_m2, sphere_prism_m3
+from sandmould.arrays import Centres, Radii
 from sandmould.geometry.geometry import Array, Bore
 
 
@@ -24,26 +24,13 @@ class TubeFill:
     """Grains whose centre lies inside the bore."""
     front_depth_m: float
     """Depth behind the mouth that the deepest grain edge has reached; 0 when empty."""
-    depth_edges_m: Array
-    """(m + 1,) float64, m: depths between the slabs of the profile; empty without one."""
-    profile_fraction: Array
-    """(m,) float64: sand over bore in each slab of depth."""
 
 
-def tube_fill(
-    position_m: Array, radius_m: Array, bore: Bore, depth_edges_m: Array | None = None
-) -> TubeFill:
+def tube_fill(position_m: Centres, radius_m: Radii, bore: Bore) -> TubeFill:
     """Measure the sand in a bore, cut grains counted by their exact parts.
 
     The walls of the tube are not part of the bore, so a grain that rests on the outside of a wall
     never counts. Overlaps of two grains count twice.
-
-    Parameters
-    ----------
-    position_m : (n, d) float64, m
-    radius_m : (n,) float64, m
-    depth_edges_m : (m + 1,) float64, m, optional
-        Rising depths behind the mouth, for a profile.
     """
     part = sand_in_bore(position_m, radius_m, bore)
     depth_m, across_m = bore.local(position_m)
@@ -51,33 +38,30 @@ def tube_fill(
     # opening or behind it make the front
     in_line = _across_inside_m(across_m, bore) > 0.0
     edge_m = np.minimum(depth_m + radius_m, bore.length_m)[in_line & (part > 0.0)]
-    edges_m = np.zeros(0) if depth_edges_m is None else np.asarray(depth_edges_m, dtype=np.float64)
-    slab = [_part(position_m, radius_m, bore, a, b).sum() for a, b in pairwise(edges_m.tolist())]
     sand = float(part.sum())
     return TubeFill(
         sand_measure=sand,
         fill_fraction=sand / bore.measure,
         grains_inside=int(lies_in_bore(position_m, bore).sum()),
         front_depth_m=float(edge_m.max(initial=0.0)),
-        depth_edges_m=edges_m,
-        profile_fraction=np.array(slab) / (bore.section_measure * np.diff(edges_m)),
     )
 
 
-def sand_in_bore(position_m: Array, radius_m: Array, bore: Bore) -> Array:
+def sand_in_bore(position_m: Centres, radius_m: Radii, bore: Bore) -> Array:
     """Part of each grain inside the bore.
-
-    Parameters
-    ----------
-    position_m : (n, d) float64, m
-    radius_m : (n,) float64, m
 
     Returns
     -------
     (n,) float64, m2 in 2D or m3 in 3D
         In 3D grains cut by an edge of the bore carry an error below 1e-6 of their part.
     """
-    return _part(position_m, radius_m, bore, 0.0, bore.length_m)
+    depth_m, across_m = bore.local(position_m)
+    local_m, to_m = np.column_stack([across_m, depth_m]), bore.length_m
+    if across_m.shape[1] == 2:
+        return sphere_prism_m3(local_m, radius_m, bore.section_m, 0.0, to_m)
+    left, right = bore.section_m[:, 0]
+    rectangle_m = np.array([[left, 0.0], [right, 0.0], [right, to_m], [left, to_m]])
+    return disc_polygon_m2(local_m, radius_m, rectangle_m)
 
 
 def lies_in_bore(position_m: Array, bore: Bore) -> NDArray[np.bool_]:
@@ -85,17 +69,6 @@ def lies_in_bore(position_m: Array, bore: Bore) -> NDArray[np.bool_]:
     depth_m, across_m = bore.local(position_m)
     inside = _across_inside_m(across_m, bore) > 0.0
     return inside & (depth_m > 0.0) & (depth_m < bore.length_m)
-
-
-def _part(position_m: Array, radius_m: Array, bore: Bore, from_m: float, to_m: float) -> Array:
-    """Part of each grain inside the bore between two depths."""
-    depth_m, across_m = bore.local(position_m)
-    local_m = np.column_stack([across_m, depth_m])
-    if across_m.shape[1] == 2:
-        return sphere_prism_m3(local_m, radius_m, bore.section_m, from_m, to_m)
-    left, right = bore.section_m[:, 0]
-    rectangle_m = np.array([[left, from_m], [right, from_m], [right, to_m], [left, to_m]])
-    return disc_polygon_m2(local_m, radius_m, rectangle_m)
 
 
 def _across_inside_m(across_m: Array, bore: Bore) -> Array:

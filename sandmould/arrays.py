@@ -12,3 +12,7 @@ Places = NDArray[np.uint32]
 WholeNumbers = NDArray[np.integer[Any]]
 """Of any width."""
 Flags = NDArray[np.bool_]
+Centres = NDArray[np.float64]
+"""(n, d) float64, m: of grains, in the order of their ids."""
+Radii = NDArray[np.float64]
+"""(n,) float64, m: of the same grains."""

@@ -46,10 +46,7 @@ def kernel_sources(root: Path) -> dict[str, bytes]:
     Imports are followed since a kernel holds constants and named tuples of files that compile
     nothing.
 
-    Parameters
-    ----------
-    root : Path
-        Folder of the packages.
+    ``root``: folder of the packages.
 
     Returns
     -------

@@ -12,6 +12,7 @@ from sandmould.engines.snapshot import Snapshot
 from sandmould.pattern_fe.coupling.convergence_log import CONVERGENCE_LOG
 from sandmould.pattern_fe.coupling.foam_body import FoamBody
 from sandmould.runs.manifest import save_manifest
+from tests.snapshots import write_snapshots
 
 FORCE_N = -0.2
 """On the tip of the flange, downwards."""
@@ -31,18 +32,19 @@ def write_bent_run(folder: Path, body: FoamBody, share: float = 1.0) -> None:
 
     The convergence log has ten windows a snapshot.
     """
-    (folder / "snapshots").mkdir()
+    made = []
     load, bent = tip_load(body)
     one = np.array([1])
     place_m, none = np.array([[0.01, 0.002]]), np.zeros((1, 2))
     moments = [(0.02, np.nan, 0.0), (0.04, np.nan, 1.0), (0.04, 0.0, 1.0), (0.06, 0.02, 0.5)]
-    for number, (time_s, shaken_s, part) in enumerate(moments):
+    for time_s, shaken_s, part in moments:
         stage = "settle_1" if np.isnan(shaken_s) else "vibrate_1"
         moved_m = body.vertices_m + part * share * bent
-        Snapshot(
+        made.append(Snapshot(
             time_s, shaken_s, stage, one, one, place_m, none, np.zeros((1, 3)), np.array([0.002]),
             pattern_m=moved_m, pattern_load_n=load,
-        ).save(folder / "snapshots" / f"{number:06d}.npz")  # fmt: skip
+        ))  # fmt: skip
+    write_snapshots(folder, made)
     write_convergence_log(folder)
     save_manifest(folder, {"cost": {"wall_s": 6.0}})
 

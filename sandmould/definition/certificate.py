@@ -65,10 +65,7 @@ def round_best_hz(best_hz: float) -> tuple[float, ...]:
 def spanned_hz(certified_hz: Sequence[float]) -> dict[int, float]:
     """All frequencies that a control may be run at, by their steps from the best.
 
-    Parameters
-    ----------
-    certified_hz : sequence of float, Hz
-        As ``round_best_hz`` gives them.
+    ``certified_hz``, sequence of float, Hz: as ``round_best_hz`` gives them.
 
     Returns
     -------

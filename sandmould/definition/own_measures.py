@@ -153,10 +153,7 @@ def _in_order(trees: Mapping[str, ast.expr]) -> list[str]:
 def problems_in_scene(own: Mapping[str, str], has: Collection[str]) -> Iterator[Problem]:
     """List the measures that sound formulas name and a scene will not have.
 
-    Parameters
-    ----------
-    has : collection of str
-        Measures of the scene that are numbers.
+    ``has``: measures of the scene that are numbers.
     """
     for name, formula in own.items():
         if name in has:

@@ -166,12 +166,7 @@ class FacetGrids:
         self._vertices_m: Floats = np.zeros((0, 0))
 
     def of(self, dim: Any, arrays: SurfaceArrays, reach_m: float) -> tuple[FacetGrid, float]:
-        """Give a grid of facets, and how far any of them has moved since they were sorted, m.
-
-        Parameters
-        ----------
-        dim : tuple of d floats
-        """
+        """Give a grid of facets, and how far any of them has moved since they were sorted, m."""
         moved_m = math.inf
         if self._corner is arrays.corner:
             moved_m = farthest_moved(arrays, self._vertices_m)

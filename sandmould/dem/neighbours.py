@@ -78,10 +78,7 @@ def extent_of(position: Floats) -> tuple[Floats, Floats]:
 def sort_into_cells(position: Floats, grid: Grid) -> tuple[Ints, Ints]:
     """Sort grains by cells.
 
-    Parameters
-    ----------
-    position : (n, d) float64, m
-        Finite.
+    ``position``, (n, d) float64, m: finite.
 
     Returns
     -------

@@ -6,6 +6,7 @@ import math
 import os
 from collections.abc import Callable
 from concurrent.futures import ThreadPoolExecutor
+from typing import Any
 
 import numpy as np
 
@@ -18,13 +19,7 @@ from sandmould.dem.kinds import pair_up
 from sandmould.dem.lanes import lanes_of_processor
 from sandmould.dem.motion import kick
 from sandmould.dem.moving_state import from_arrays, to_arrays
-from sandmould.dem.near_pairs import (
-    Contacts,
-    contacts_of,
-    move_contacts,
-    near_gap,
-    new_near_pairs,
-)
+from sandmould.dem.near_pairs import Contacts, contacts_of, move_contacts, near_gap, new_near_pairs
 from sandmould.dem.neighbours import Pairs, extent_of, list_pairs, make_grid, sort_into_cells
 from sandmould.dem.steps import (
     LIST_IS_OLD,
@@ -285,10 +280,8 @@ class Solver:
     def advance(self, displacement_m: Floats) -> None:
         """Compute as many steps as displacements are given, less two.
 
-        Parameters
-        ----------
-        displacement_m : (steps + 2,) float64, m
-            Of the box along its direction, from one step before now to one step beyond the last.
+        ``displacement_m``, (steps + 2,) float64, m: of the box along its direction, from one step
+        before now to one step beyond the last.
 
         Raises
         ------
@@ -310,30 +303,16 @@ class Solver:
 
     def _run(self, steps: int, drifted: bool, displacement_m: Floats) -> tuple[int, int]:
         """Let all threads run the step loop together."""
-
-        def run_thread(thread: int, threads: int, team: Team) -> tuple[int, int]:
-            ended: tuple[int, int] = advance(
-                self._dim,
-                steps,
-                drifted,
-                self.scene,
-                self.moving,
-                displacement_m,
-                0.5 * self._skin,
-                thread,
-                threads,
-                team,
-            )
-            return ended
-
-        done, state = self._together(run_thread)
+        done, state = self._together(advance, steps, drifted, displacement_m)
         if min(done, steps - 1) % 2:
             grains, ahead = exchanged(self.grains, self.moving.ahead)
             self.moving = self.moving._replace(grains=grains, ahead=ahead)
         return done, state
 
-    def _together(self, run_thread: Callable[[int, int, Team], tuple[int, int]]) -> tuple[int, int]:
-        """Call a step loop in all threads: with the thread's number, how many, and what they share.
+    def _together(
+        self, loop: Callable[..., Any], steps: int, drifted: bool, displacement_m: Floats, *own: Any
+    ) -> tuple[int, int]:
+        """Call a step loop in all threads: arguments as of ``advance``, then its own.
 
         Returns
         -------
@@ -346,10 +325,14 @@ class Solver:
             new_barrier(), np.zeros(chunks), np.zeros(1, dtype=np.int64),
             shares(self.moving.bound, self.moving.near, threads),
         )  # fmt: skip
-        others = [
-            self._pool.submit(run_thread, thread, threads, team) for thread in range(1, threads)
-        ]
-        ended = run_thread(0, threads, team)
+        given = self._dim, steps, drifted, self.scene, self.moving, displacement_m, 0.5 * self._skin
+
+        def run_thread(thread: int) -> tuple[int, int]:
+            ended: tuple[int, int] = loop(*given, thread, threads, team, *own)
+            return ended
+
+        others = [self._pool.submit(run_thread, thread) for thread in range(1, threads)]
+        ended = run_thread(0)
         for other in others:
             other.result()
         return ended
@@ -357,10 +340,7 @@ class Solver:
     def whole_step_velocities(self, acceleration_m_s2: float = 0.0) -> tuple[Floats, Floats]:
         """Velocities and spins at the time of the positions.
 
-        Parameters
-        ----------
-        acceleration_m_s2 : float
-            Of the box along its direction now, zero in the laboratory frame.
+        ``acceleration_m_s2``: of the box along its direction now, zero in the laboratory frame.
 
         Returns
         -------

@@ -241,9 +241,7 @@ class Surfaces:
     def forces(self, loads: Floats) -> dict[str, Floats]:
         """Sum the loads on the vertices of each surface, (d,) float64, N, by its name.
 
-        Parameters
-        ----------
-        loads : (nv, d) float64, N
+        ``loads``: (nv, d) float64, N.
         """
         return {name: loads[rows].sum(axis=0) for name, rows in self._range.items()}
 

@@ -89,13 +89,13 @@ def _advance(
     drifted: bool,
     scene: DemScene,
     moving: Moving,
-    table: MountedTable,
-    drive: TableDrive,
     place: Floats,
     half_skin: float,
     thread: int,
     threads: int,
     team: Team,
+    table: MountedTable,
+    drive: TableDrive,
 ) -> tuple[int, int]:
     """See ``steps.advance``, which computes every step; the table moves before each.
 
@@ -133,10 +133,7 @@ class TableSolver(Solver):
     def advance_on_table(self, table: MountedTable, drive: TableDrive) -> Floats:
         """Compute steps in which the table moves freely.
 
-        Parameters
-        ----------
-        drive : TableDrive
-            Its length is the number of steps.
+        ``drive``: its length is the number of steps.
 
         Returns
         -------
@@ -171,25 +168,7 @@ class TableSolver(Solver):
         table, whole = self._table
         left = slice(len(whole.push_n) - steps, None)
         drive = TableDrive(whole.push_n[left], whole.damping_kg_s[left])
-
-        def run_thread(thread: int, threads: int, team: Team) -> tuple[int, int]:
-            ended: tuple[int, int] = _advance(
-                self._dim,
-                steps,
-                drifted,
-                self.scene,
-                self.moving,
-                table,
-                drive,
-                displacement_m,
-                0.5 * self._skin,
-                thread,
-                threads,
-                team,
-            )
-            return ended
-
-        return self._together(run_thread)
+        return self._together(_advance, steps, drifted, displacement_m, table, drive)
 
     def state(self) -> dict[str, np.ndarray]:
         """Everything that a continued run needs to go on bit for bit."""

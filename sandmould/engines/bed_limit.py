@@ -23,10 +23,7 @@ def limit_of_snapshot_s(
 
     Grains and surfaces that overlap touch. What they remember does not count: all contacts stick.
 
-    Parameters
-    ----------
-    opened : iterable of str
-        Plates that were taken away.
+    ``opened``: plates that were taken away.
 
     Returns
     -------

@@ -12,10 +12,7 @@ from sandmould.scenario.scenario import Scenario
 def displacements(stage: Stage, first: int, count: int, step_s: float) -> Array:
     """Displacement of the box along its direction at some steps of a stage.
 
-    Parameters
-    ----------
-    first : int
-        First step, counted from the stage's beginning.
+    ``first``: first step, counted from the stage's beginning.
 
     Returns
     -------

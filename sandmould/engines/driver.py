@@ -110,7 +110,11 @@ class Driver:
 
         A restartable outcome leaves a checkpoint: the same command continues.
         """
-        signal.signal(signal.SIGTERM, self._ask_to_stop)
+
+        def ask_to_stop(number: int, frame: FrameType | None) -> None:
+            self._stop_requested = True
+
+        signal.signal(signal.SIGTERM, ask_to_stop)
         newest, notes = checkpoints.newest_checkpoint(self._work)
         if newest is not None and newest[1].scenario_hash != self._hash:
             aside = checkpoints.set_aside(self._work, newest[1])
@@ -124,7 +128,8 @@ class Driver:
             self._shared_stages = mark.shared_stages
             self._simulated_s = self.cost.steps * self.cost.time_step_s
         outcome, detail = Outcome.FINISHED, ""
-        self._begin_clocks()
+        self._earlier = (self.cost.wall_s, self.cost.cpu_s)
+        self._begun, self._cpu_begun = time.monotonic(), cpu_time_s()
         try:
             while not self._go_on(newest):
                 newest, _ = checkpoints.newest_checkpoint(self._work)
@@ -146,7 +151,8 @@ class Driver:
         mark = newest[1] if newest else None
         if mark is not None and mark.bed_limit_s is not None:
             self._take_step_of_bed(mark.bed_limit_s)
-        self._progress = Progress(self._name, self._work, self._expected_grain_steps())
+        own = grain_steps(self._program, self._shared_stages)
+        self._progress = Progress(self._name, self._work, own)
         self._progress.earlier_cpu_s = self._earlier[1]
         session: Session | None = None
         try:
@@ -165,21 +171,10 @@ class Driver:
         finally:
             self._end(session)
 
-    def _expected_grain_steps(self) -> float:
-        """Work of this run: all but that of a fill that it shares."""
-        return grain_steps(self._program, self._shared_stages)
-
     def _at_end_of_fill(self, mark: CheckpointMark) -> bool:
         """Whether a checkpoint is where the filled bed has given its step."""
         end = self._program.stages[self._program.fill_stages - 1]
         return mark.bed_limit_s is not None and mark.stage == end.name
-
-    def _ask_to_stop(self, number: int, frame: FrameType | None) -> None:
-        self._stop_requested = True
-
-    def _begin_clocks(self) -> None:
-        self._earlier = (self.cost.wall_s, self.cost.cpu_s)
-        self._begun, self._cpu_begun = time.monotonic(), cpu_time_s()
 
     def _read_clocks(self) -> None:
         self.cost.wall_s = self._earlier[0] + time.monotonic() - self._begun
@@ -208,7 +203,8 @@ class Driver:
                     return False
             self._check_rest(session, stage)
             ends_fill = self._keeps_end and stage is self._program.stages[-1]
-            finds_limit = self._lacks_bed_limit and (
+            takes_step = self._scenario.takes_step_of_bed and self._bed_limit_s is None
+            finds_limit = takes_step and (
                 ends_fill or number + 1 == self._program.fill_stages < len(self._program.stages)
             )
             if finds_limit:
@@ -223,11 +219,6 @@ class Driver:
         if session.is_root:
             self._show(session, last=True)
         return True
-
-    @property
-    def _lacks_bed_limit(self) -> bool:
-        """Whether the run takes its step from the filled bed and has not found its limit yet."""
-        return self._scenario.takes_step_of_bed and self._bed_limit_s is None
 
     def _check_rest(self, session: Session, stage: Stage) -> None:
         """Stop where the sand did not come to rest, or came to rest before it had flowed out."""

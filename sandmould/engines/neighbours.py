@@ -7,6 +7,7 @@ from collections.abc import Iterator
 import numpy as np
 from numpy.typing import NDArray
 
+from sandmould.arrays import Centres, Radii
 from sandmould.geometry.geometry import Array
 
 _CHUNK = 32_768
@@ -18,9 +19,7 @@ def near_pairs(
 ) -> Iterator[tuple[NDArray[np.int64], NDArray[np.int64], Array]]:
     """Give every pair of centres not farther apart than the reach, once, in a few portions.
 
-    Parameters
-    ----------
-    position_m : (n, d) float64, m
+    ``position_m``: (n, d) float64, m.
 
     Yields
     ------
@@ -53,14 +52,9 @@ def near_pairs(
 
 
 def touching_pairs(
-    position_m: Array, radius_m: Array, gap_m: float = 0.0
+    position_m: Centres, radius_m: Radii, gap_m: float = 0.0
 ) -> Iterator[tuple[NDArray[np.int64], NDArray[np.int64], Array]]:
     """Give every pair of grains whose surfaces are nearer than a gap, once, in a few portions.
-
-    Parameters
-    ----------
-    position_m : (n, d) float64, m
-    radius_m : (n,) float64, m
 
     Yields
     ------

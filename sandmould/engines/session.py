@@ -140,10 +140,7 @@ class Session(Protocol):
     def advance(self, duration_s: float | None = None) -> None:
         """Compute for a duration, or up to the next check, not past the end of the stage.
 
-        Parameters
-        ----------
-        duration_s : float, optional
-            Rounded up to whole steps.
+        ``duration_s``: rounded up to whole steps.
 
         Raises
         ------
@@ -218,10 +215,7 @@ class SandSession(Session, Protocol):
         Of a check that ended without asking nothing is kept. Forces between vertices are shared
         out by shape functions, eq. (56), so that force and moment are those of the contacts.
 
-        Parameters
-        ----------
-        name : str
-            A surface made of facets.
+        ``name``: a surface made of facets.
 
         Returns
         -------

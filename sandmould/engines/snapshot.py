@@ -2,17 +2,14 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Mapping
 from dataclasses import dataclass, fields
-from pathlib import Path
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from sandmould.geometry.geometry import Scene
-from sandmould.runs.files import replaced
 from sandmould.scenario.scenario import Scenario
 
 
@@ -46,11 +43,6 @@ class Snapshot:
     """(nv, d) float64, N: the sand's force on each, its mean over the last record, or that of the
     last step where the pattern is stepped with the grains."""
 
-    def save(self, path: Path) -> None:
-        """Write to an ``.npz`` file; where it is, it is whole."""
-        with replaced(path) as partial, partial.open("wb") as file:
-            np.savez(file, **self.arrays())
-
     def arrays(self) -> dict[str, Any]:
         """Values by name, as files hold them."""
         values = {f.name: getattr(self, f.name) for f in fields(self)}
@@ -61,30 +53,9 @@ class Snapshot:
         """The snapshot that such values are of; a KeyError or TypeError where some are missing."""
         values = {f.name: arrays[f.name] for f in fields(cls) if f.name in arrays}
         values["time_s"] = float(values["time_s"])
-        values["vibration_time_s"] = vibration_time_of(values["vibration_time_s"])
+        values["vibration_time_s"] = float(values["vibration_time_s"])
         values["stage"] = str(values["stage"])
         return cls(**values)
-
-    @classmethod
-    def load(cls, path: Path) -> Snapshot:
-        """Read from an ``.npz`` file.
-
-        Raises
-        ------
-        ValueError
-            When the file is cut short or is no snapshot.
-        """
-        try:
-            with np.load(path, allow_pickle=False) as data:
-                return cls.of_arrays(data)
-        except Exception as error:
-            raise ValueError(f"{path}: not a readable snapshot ({error})") from error
-
-
-def vibration_time_of(stored: Any) -> float:
-    """Time of vibration that a file has; older files have -1 where it is absent."""
-    value = float(stored)
-    return value if value >= 0.0 else math.nan
 
 
 def scene_at(scenario: Scenario, snapshot: Snapshot) -> Scene:

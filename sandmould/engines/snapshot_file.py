@@ -2,15 +2,13 @@
 
 ``snapshots.npz`` is a zip archive without compression: ``numpy.load("snapshots.npz")`` gives array
 ``position_m`` of snapshot 5 as ``000005/position_m``. The archive's directory is written when the
-file is closed; without it the arrays are found by their own heads. Older runs have a folder
-``snapshots`` with a file a snapshot.
+file is closed; without it the arrays are found by their own heads.
 """
 
 from __future__ import annotations
 
 import contextlib
 import io
-import shutil
 import struct
 import zipfile
 import zlib
@@ -21,12 +19,10 @@ from typing import Any
 
 import numpy as np
 
-from sandmould.engines.snapshot import Snapshot, vibration_time_of
+from sandmould.engines.snapshot import Snapshot
 from sandmould.runs.files import replaced
 
 SNAPSHOTS = "snapshots.npz"
-OLDER = "snapshots"
-"""Folder of runs of older times."""
 _HEAD = struct.Struct("<4s5H3I2H")
 """Signature, version, flags, method, time, date, CRC-32, two sizes, lengths of name and extra."""
 _MAGIC = b"PK\x03\x04"
@@ -59,8 +55,8 @@ class StoredSnapshot:
     """The file that holds it."""
     name: str
     """Its number with leading zeros."""
-    _places: Mapping[str, _Place] | None = field(default=None, repr=False, compare=False)
-    """Of its arrays; None where it has the file for itself."""
+    _places: Mapping[str, _Place] = field(repr=False, compare=False)
+    """Of its arrays."""
 
     def load(self) -> Snapshot:
         """Read it.
@@ -70,8 +66,6 @@ class StoredSnapshot:
         ValueError
             When it is damaged.
         """
-        if self._places is None:
-            return Snapshot.load(self.path)
         try:
             return Snapshot.of_arrays({k: p.read(self.path) for k, p in self._places.items()})
         except Exception as error:
@@ -81,26 +75,20 @@ class StoredSnapshot:
 
     def times_s(self) -> tuple[float, float]:
         """Simulated time and time of vibration; raises whatever a broken file leads to."""
-        names = ("time_s", "vibration_time_s")
-        if self._places is not None:
-            time_s, vibration_s = (self._places[n].read(self.path) for n in names)
-        else:
-            with np.load(self.path, allow_pickle=False) as arrays:
-                time_s, vibration_s = (arrays[n] for n in names)
-        return float(time_s), vibration_time_of(vibration_s)
+        times = (self._places[name].read(self.path) for name in ("time_s", "vibration_time_s"))
+        time_s, vibration_s = map(float, times)
+        return time_s, vibration_s
 
 
 def stored_snapshots(folder: Path) -> list[StoredSnapshot]:
     """Snapshots of a run's folder, or of its work folder, in order of their numbers."""
-    older = sorted((folder / OLDER).glob("*.npz"))
     path = folder / SNAPSHOTS
     places: dict[str, dict[str, _Place]] = {}
     if path.is_file():
         for name, place in _places(path):
             number, _, array = name.removesuffix(".npy").partition("/")
             places.setdefault(number, {})[array] = place
-    whole = (StoredSnapshot(path, n, at) for n, at in sorted(places.items()) if _LAST in at)
-    return [*(StoredSnapshot(each, each.stem) for each in older), *whole]
+    return [StoredSnapshot(path, n, at) for n, at in sorted(places.items()) if _LAST in at]
 
 
 def _places(path: Path) -> Iterator[tuple[str, _Place]]:
@@ -142,7 +130,6 @@ class SnapshotFile:
             with replaced(path) as partial, zipfile.ZipFile(partial, "w") as archive:
                 for number, stored in enumerate(first):
                     _append(archive, f"{number:06d}", stored.load())
-        shutil.rmtree(work / OLDER, ignore_errors=True)
         self.count = len(first)
         self._file = path.open("r+b")
         self._archive = zipfile.ZipFile(self._file, "a")
@@ -174,7 +161,7 @@ def _is_closed_with(path: Path, stored: list[StoredSnapshot]) -> bool:
             numbers = {name.partition("/")[0] for name in archive.namelist()}
     except (OSError, zipfile.BadZipFile):
         return False
-    return numbers == {each.name for each in stored} and all(s.path == path for s in stored)
+    return numbers == {each.name for each in stored}
 
 
 def _append(archive: zipfile.ZipFile, number: str, snapshot: Snapshot) -> None:

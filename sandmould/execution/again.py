@@ -13,7 +13,6 @@ from sandmould.plain_file import UNREADABLE
 from sandmould.runs.manifest import MANIFEST_FILE
 from sandmould.runs.outcome import Outcome, RunOutcome
 from sandmould.study.plan.build_plan import open_plan
-from sandmould.study.plan.load_study import STUDIES
 from sandmould.study.plan.ownership import owner_path
 from sandmould.study.plan.plan_files import read_run
 
@@ -21,10 +20,7 @@ from sandmould.study.plan.plan_files import read_run
 def forget(names: Sequence[str], results: Path) -> list[Path]:
     """Forget how runs ended, whether they failed or finished.
 
-    Parameters
-    ----------
-    names : sequence of str
-        Of runs: ``RUN``, ``STUDY/RUN`` or the path of a run's folder.
+    ``names``: those of runs, ``RUN``, ``STUDY/RUN`` or the path of a run's folder.
 
     Returns
     -------
@@ -40,7 +36,7 @@ def forget(names: Sequence[str], results: Path) -> list[Path]:
     folders, problems = run_folders(names, results)
     studies: dict[Path, Path] = {}
     for study in dict.fromkeys(folder.parent.parent for folder in folders):
-        path = owner_path(study) or _of_name(study.name)
+        path = owner_path(study)
         if path is None:
             valid = f"one whose study file is there: that of {study} is not"
             problems += [Problem("RUN", f.name, valid) for f in folders if study in f.parents]
@@ -110,9 +106,3 @@ def _which(name: str, found: Sequence[Path], results: Path) -> str:
         return f"a run of {results}, which has none"
     near = difflib.get_close_matches(Path(name).name, known, n=3, cutoff=0.5)
     return f"a run of {results}, such as {', '.join(near or known[:3])}"
-
-
-def _of_name(name: str) -> Path | None:
-    """The file of a study whose results are older than the note of it."""
-    places = (folder / f"{name}.yaml" for folder in (Path(), STUDIES[0]))
-    return next((path for path in places if path.is_file()), None)

@@ -44,10 +44,7 @@ class AskedToEndError(JobError):
 def do_job(work: str, *given: Any, log: str) -> None:
     """Do one piece of work that computes no run.
 
-    Parameters
-    ----------
-    work : str
-        Module and function: what it imports is imported by its own process alone.
+    ``work``: module and function: what it imports is imported by its own process alone.
 
     Raises
     ------

@@ -21,7 +21,6 @@ import pandas as pd
 
 from sandmould import ROOT
 from sandmould.definition.run import Run
-from sandmould.definition.study import Study
 from sandmould.digest import digest
 from sandmould.kinds.registry import kind_of
 from sandmould.module_main import run_main
@@ -95,11 +94,8 @@ def record(path: Path, results: Path, figures: Sequence[str] = ()) -> Path:
 
     Runs that failed are named in the record.
 
-    Parameters
-    ----------
-    figures : sequence of str
-        Names of figures that a page shall show. Those that the record has are kept, too, as they
-        are drawn now.
+    ``figures``: names of figures that a page shall show. Those that the record has are kept, too,
+    as they are drawn now.
 
     Raises
     ------
@@ -116,7 +112,8 @@ def record(path: Path, results: Path, figures: Sequence[str] = ()) -> Path:
         raise SystemExit(f"{folder} is not whole, {len(missing)} runs are missing: run the study.")
     summary = read_summary(folder)
     failed = summary[summary[OUTCOME] != Outcome.FINISHED.label]
-    names = [SUMMARY, *(["agreement.tsv"] if _compares(study.study) else [])]
+    compares = bool(study.study.equivalence.keys) or study.study.cross_check is not None
+    names = [SUMMARY, *(["agreement.tsv"] if compares else [])]
     names += [name for name in (ROUNDS_FILE, CHECKS[0]) if (folder / name).exists()]
     provenance = read_manifest(folder / "runs" / runs[0].run)["origin"]
     record: dict[str, Any] = {
@@ -160,10 +157,7 @@ def _keep_figures(drawn: Path, kept: Path, asked: Sequence[str]) -> None:
 def over_time(curves: pd.DataFrame, measure: str) -> pd.DataFrame:
     """What a study judges at ``TIMES`` moments of the vibration of each run.
 
-    Parameters
-    ----------
-    curves : DataFrame
-        One row a snapshot.
+    ``curves``: one row a snapshot.
 
     Returns
     -------
@@ -194,11 +188,6 @@ def _engines(summary: pd.DataFrame) -> dict[str, str]:
 def _work(column: str, summary: pd.DataFrame) -> dict[str, float]:
     """What was computed in all; nothing where runs do not count it."""
     return {column: float(summary[column].sum())} if column in summary else {}
-
-
-def _compares(study: Study) -> bool:
-    """Whether a study compares settings, so that it has a table of agreement."""
-    return bool(study.equivalence.keys) or study.cross_check is not None
 
 
 def stale_records() -> list[tuple[str, str]]:

@@ -68,10 +68,7 @@ def provenance(scenario: Any, *arguments: str) -> dict[str, Any]:
 def simulate(folder: Path, run: Run | None = None) -> int:
     """Compute a run in this process, or as one rank of several.
 
-    Parameters
-    ----------
-    run : Run, optional
-        Read from its folder unless given.
+    ``run``: read from its folder unless given.
 
     Returns
     -------
@@ -107,11 +104,10 @@ def _finish(folder: Path, scenario: Section, outcome: RunOutcome, cost: Cost) ->
     finish(folder, execution.products, outcome, cost, provenance(scenario, str(folder)))
 
 
-def main(folder: str) -> int:
-    """Compute a run, or one rank of it."""
-    return simulate(Path(folder))
-
-
 if __name__ == "__main__":
     signal.signal(signal.SIGINT, signal.SIG_DFL)  # Ctrl-C ends it as a kill does, silently
-    run_main(main, "python -m sandmould.execution.simulate FOLDER-OF-A-RUN", (1,))
+    run_main(
+        lambda folder: simulate(Path(folder)),
+        "python -m sandmould.execution.simulate FOLDER-OF-A-RUN",
+        (1,),
+    )

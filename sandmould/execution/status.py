@@ -13,14 +13,7 @@ from typing import Any, Literal
 from sandmould.bad_input import BadInputError
 from sandmould.definition.run import Run
 from sandmould.execution.cluster.driver import driver_lines
-from sandmould.execution.cluster.queue import (
-    Job,
-    Outlook,
-    jobs_of,
-    live_jobs,
-    outlook,
-    queue_lines,
-)
+from sandmould.execution.cluster.queue import Job, Outlook, jobs_of, live_jobs, outlook, queue_lines
 from sandmould.execution.locks import is_locked
 from sandmould.execution.spent import noted_s
 from sandmould.execution.tidy import freed_bytes, orphans

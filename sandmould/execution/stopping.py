@@ -37,10 +37,7 @@ class Stopped(BaseException):
 def until_stopped(work: Callable[[], int], name: str) -> int:
     """Do a command's work; at Ctrl-C or kill say that the same command goes on.
 
-    Parameters
-    ----------
-    work : callable
-        Gives the exit status.
+    ``work``: gives the exit status.
 
     Returns
     -------

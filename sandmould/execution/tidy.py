@@ -5,6 +5,7 @@ from __future__ import annotations
 import os
 import re
 import shutil
+import stat
 from collections.abc import Iterable, Iterator
 from dataclasses import dataclass
 from pathlib import Path
@@ -57,11 +58,9 @@ def leftovers(plan: Plan, results: Path) -> Leftovers:
 def freed_bytes(folders: Iterable[Path]) -> int:
     """Disk that removing folders frees: a file with another name elsewhere frees nothing."""
     entries = (path.lstat() for folder in folders for path in (folder, *_below(folder)))
-    return sum(_BLOCK_BYTES * e.st_blocks for e in entries if e.st_nlink == 1 or _is_folder(e))
-
-
-def _is_folder(entry: os.stat_result) -> bool:
-    return (entry.st_mode & 0o170000) == 0o040000
+    return sum(
+        _BLOCK_BYTES * e.st_blocks for e in entries if e.st_nlink == 1 or stat.S_ISDIR(e.st_mode)
+    )
 
 
 def _below(folder: Path) -> Iterator[Path]:

@@ -18,10 +18,7 @@ _VALID = "a number, text, true or false, None, or a list or a dictionary of such
 def study_text(study: Mapping[str, Any]) -> str:
     """The text of a study's file.
 
-    Parameters
-    ----------
-    study : mapping
-        Arrays and numbers of numpy are taken for what they hold.
+    ``study``: arrays and numbers of numpy are taken for what they hold.
 
     Raises
     ------

@@ -159,11 +159,8 @@ def kind_of(section: type[BaseModel]) -> str:
 def keys_text(path: str = "") -> str:
     """Describe the keys below a path, or the one key that it names.
 
-    Parameters
-    ----------
-    path : str
-        Such as ``scenario.vibration``; places in lists may stand in it or not. Empty for those of
-        a study.
+    ``path``: such as ``scenario.vibration``; places in lists may stand in it or not. Empty for
+    those of a study.
 
     Raises
     ------

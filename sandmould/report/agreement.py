@@ -12,11 +12,7 @@ from sandmould.definition.study import Study
 from sandmould.drawing.chart import PLAIN, Chart, Mark, Tint
 from sandmould.report.tables import Cell, Column, Table
 from sandmould.runs.formatting import listed, name_of, number, seconds, titled
-from sandmould.statistics.agreement import (
-    Compared,
-    interval_text,
-    speeds,
-)
+from sandmould.statistics.agreement import Compared, interval_text, speeds
 from sandmould.statistics.equivalence import PERCENT
 from sandmould.study.collect import Collected, compare_study
 from sandmould.wording.agreement import agreement_sentences

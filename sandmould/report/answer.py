@@ -30,14 +30,12 @@ from sandmould.statistics.evidence import usable_values
 from sandmould.statistics.optimum import Optimum
 from sandmould.statistics.settings import Setting
 from sandmould.statistics.verdict import Verdict
-from sandmould.wording.answer import AnswerWords, place_text
+from sandmould.wording.answer import OF_DRIVE, AnswerWords, place_text
 from sandmould.wording.next_steps import NextSteps
 from sandmould.wording.robustness import recommendation_sentence
 
 MOST_CHOICES = 12
 """Settings that the first screen lists."""
-_OF_DRIVE = ("frequency_hz", "acceleration_g", "velocity_m_s", "displacement_m")
-"""Ends of swept keys that the motion of the box states."""
 
 
 @dataclass(frozen=True)
@@ -193,7 +191,7 @@ def _figures(setting: Setting, answer: Answer, summary: pd.DataFrame) -> tuple[K
     figures += [
         KeyNumber(value_text(key, value), name_of(key))
         for key, value in setting.values.items()
-        if drive is None or key.rpartition(".")[2] not in _OF_DRIVE
+        if drive is None or key.rpartition(".")[2] not in OF_DRIVE
     ]
     share = share_of_what_fits(summary, verdict.measure, setting.values)
     runs = f"mean of {setting.n} runs, ± its 95 % interval" if setting.n > 1 else "one run"
@@ -210,7 +208,7 @@ def _motion_figures(drive: BoxDrive | None) -> list[KeyNumber]:
         KeyNumber(
             f"{number(1e3 * drive.displacement_m)} mm",
             "amplitude (half of peak to peak)",
-            f"{number(1e3 * drive.end_to_end_m)} mm end to end",
+            f"{number(2e3 * drive.displacement_m)} mm end to end",
         ),
         KeyNumber(
             f"{number(drive.acceleration_g)} g",

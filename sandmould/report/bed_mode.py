@@ -11,7 +11,7 @@ import pandas as pd
 
 from sandmould.analysis.spectrum import first_resonance_hz
 from sandmould.runs.columns import BED_HEIGHT_M
-from sandmould.runs.formatting import number
+from sandmould.runs.templates import worded
 from sandmould.scenario.hardness import bed_hardness, column_mode_hz, column_speed_m_s
 from sandmould.scenario.scenario import Scenario
 from sandmould.statistics.recommendation import ModelWaveSpeed
@@ -52,18 +52,7 @@ class BedMode:
 
     def beside(self, frequency_hz: float) -> str:
         """Say what a frequency is over the mode, as a sentence."""
-        said = f"{number(frequency_hz)} Hz is "
-        if self.is_measured:
-            return (
-                f"{said}{number(frequency_hz / self.measured_hz, 2)} times the bed's own first "
-                f"mode, measured by a small shake at {number(self.measured_hz)} Hz."
-            )
-        return (
-            f"{said}{number(frequency_hz / self.estimate_hz, 2)} times c/(4 H) = "
-            f"{number(self.estimate_hz)} Hz at the {self.depth_is} depth H of "
-            f"{number(1e3 * self.depth_m)} mm. This is only an estimate of the lowest frequency at "
-            "which the bed swings by itself. No small shake has measured it."
-        )
+        return worded("bed_mode.j2", it=self, frequency_hz=frequency_hz)
 
 
 def bed_mode(

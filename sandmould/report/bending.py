@@ -23,22 +23,17 @@ from sandmould.pattern_fe.scene import pattern_of
 from sandmould.report.bending_figures import coupling_map, draw_distances, draw_outlines
 from sandmould.report.curves import runs_of, setting_tints, time_chart
 from sandmould.report.tables import Cell, Column, Table
-from sandmould.runs.columns import (
-    RUN,
-    SOLID_FRACTION,
-    TIME_S,
-    VIBRATION_TIME_S,
-)
+from sandmould.runs.columns import RUN, SOLID_FRACTION, TIME_S, VIBRATION_TIME_S
 from sandmould.runs.formatting import number, setting_text
 from sandmould.runs.templates import sentences
 from sandmould.scenario.pattern import PatternDrawing
 from sandmould.scenario.scenario import Scenario
+from sandmould.statistics.decision import TIP
 from sandmould.statistics.evidence import left_out, usable_values
 from sandmould.statistics.settings import group_settings, setting_of
 from sandmould.statistics.verdict import Verdict
 from sandmould.study.collect import Collected
 
-TIP = "pattern_tip_deflection_m"
 RECOVERED = "pattern_tip_recovered_m"
 _RECOVERS = 0.02
 """Share of the deflection that must come back before the page says so."""
@@ -153,16 +148,10 @@ def _tip(row: pd.Series[Any]) -> dict[str, float]:
 def paper_sentences(scenario: Scenario, collected: Collected, pictured_run: str) -> tuple[str, ...]:
     """What the paper states of its L, and whether the fillings of one setting say the same.
 
-    Parameters
-    ----------
-    pictured_run : str
-        Whose setting is judged, by the mean over its fillings.
+    ``pictured_run``: whose setting is judged, by the mean over its fillings.
 
-    Returns
-    -------
-    tuple of str
-        Empty under a scene that is none of the paper's: only an L that is filled in layers and
-        then vibrated is.
+    Empty under a scene that is none of the paper's: only an L that is filled in layers and then
+    vibrated is.
     """
     pattern = scenario.pattern
     is_l = pattern is not None and pattern.shape.kind == "l_shape"

@@ -59,15 +59,9 @@ class CouplingMap:
 def coupling_map(collected: Collected, states: Mapping[str, State]) -> CouplingMap | None:
     """Draw verdicts and predicted limits, a panel for each setting of the other swept keys.
 
-    Parameters
-    ----------
-    states : mapping of run to state
-        Of the runs that can be judged.
+    ``states``: of the runs that can be judged.
 
-    Returns
-    -------
-    CouplingMap or None
-        None unless modulus and fixed share are swept and predictions are known.
+    None unless modulus and fixed share are swept and predictions are known.
     """
     keys, curves = collected.keys, collected.curves
     if not {MODULUS, FACTOR} <= set(keys) or LIMIT not in curves:

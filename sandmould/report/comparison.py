@@ -17,14 +17,7 @@ from sandmould.drawing.chart import NARROW, WIDE, Chart, Line, Mark, lay_out, ti
 from sandmould.drawing.templates import page_environment
 from sandmould.report.tables import Cell, Column, Table
 from sandmould.runs.files import write_text
-from sandmould.runs.formatting import (
-    display_scale,
-    is_number,
-    listed,
-    name_of,
-    titled,
-    with_margin,
-)
+from sandmould.runs.formatting import display_scale, is_number, listed, name_of, titled, with_margin
 from sandmould.statistics.settings import Setting
 from sandmould.statistics.verdict import FEW, compare_settings
 from sandmould.study.collect import Collected, read_collected, read_study
@@ -202,10 +195,7 @@ def _value_text(stated: dict[str, Any], key: str) -> str:
 def read_comparison(folders: Sequence[Path]) -> SideBySide:
     """Read finished studies.
 
-    Parameters
-    ----------
-    folders : sequence of Path
-        Their folders of results, at least two. The objective of the first is compared.
+    ``folders``: their folders of results, at least two. The objective of the first is compared.
 
     Raises
     ------

@@ -168,10 +168,7 @@ def objective_charts(
     Over its axis for one numeric key, in rows for other settings, and for many settings of
     several keys as one cloud of points a key.
 
-    Returns
-    -------
-    tuple of Chart
-        Empty where no run has a value or nothing is swept.
+    Empty where no run has a value or nothing is swept.
     """
     if not keys or not shown_values(summary, verdict.measure).notna().any():
         return ()

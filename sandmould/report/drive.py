@@ -9,13 +9,7 @@ import numpy as np
 import pandas as pd
 
 from sandmould.runs.columns import finished
-from sandmould.scenario.drive import (
-    ACCELERATION,
-    DISPLACEMENT,
-    VELOCITY,
-    BoxDrive,
-    laid_down_drive,
-)
+from sandmould.scenario.drive import ACCELERATION, DISPLACEMENT, VELOCITY, BoxDrive, laid_down_drive
 from sandmould.scenario.scenario import Scenario
 
 _COLUMNS = (DISPLACEMENT, VELOCITY, ACCELERATION)

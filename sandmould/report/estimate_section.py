@@ -17,15 +17,7 @@ from sandmould.report.kinds.registry import report_of
 from sandmould.report.pictured_runs import Heap
 from sandmould.report.tables import Cell, Column, Table
 from sandmould.runs.columns import CPU_S, RUN, total_s
-from sandmould.runs.formatting import (
-    listed,
-    name_of,
-    number,
-    seconds,
-    titled,
-    unit_of,
-    with_margin,
-)
+from sandmould.runs.formatting import name_of, number, seconds, titled, unit_of, with_margin
 from sandmould.runs.templates import sentences, worded
 from sandmould.statistics.calibration.sands import Calibrated, CalibratedSand
 from sandmould.statistics.emulator import TooFewRunsError, fit_emulator
@@ -142,13 +134,9 @@ def _touching(summary: pd.DataFrame) -> list[str]:
     leaning = summary[[isinstance(walls, str) for walls in summary["heap_touches"]]]
     if leaning.empty:
         return []
-    walls = sorted({str(w) for w in leaning["heap_touches"]})
-    names = [str(run) for run in leaning[RUN]]
-    nothing = "no run-out" if "run_out_m" in summary else "no angle of repose"
-    return [
-        f"In {len(names)} of {len(summary)} runs the heap touches the {listed(walls)} wall and so "
-        f"has {nothing}: {listed(names)}. Widen the box or fill in less sand."
-    ]
+    walls, names = sorted(set(leaning["heap_touches"])), [str(run) for run in leaning[RUN]]
+    given = {"walls": walls, "names": names, "planned": len(summary)}
+    return [worded("touching.j2", **given, run_out="run_out_m" in summary)]
 
 
 def _map_table(settings: Sequence[Setting], keys: tuple[str, str]) -> Table:

@@ -16,6 +16,7 @@ from sandmould.drawing.chart import Chart, Line, tints
 from sandmould.report.curves import are_on_a_scale, reported_lines, runs_by_setting
 from sandmould.runs.columns import RUN, VIBRATION_TIME_S, during_vibration
 from sandmould.runs.formatting import name_of, number, titled, value_text, with_margin
+from sandmould.runs.templates import worded
 from sandmould.scenario.scenario import Scenario
 from sandmould.statistics.evidence import left_out
 from sandmould.statistics.mean_tests import CONFIDENCE
@@ -128,21 +129,15 @@ def _chart(table: _AtTimes, study: Study, key: str, measure: str) -> Chart:
 def _limbs(table: _AtTimes, key: str, measure: str) -> str:
     """How the rate of filling rises and falls with the swept key, as power laws."""
     gained = table.mean[:, _EARLY] - table.mean[:, 0]
-    early = f"over the first {number(table.time_s[_EARLY], 2)} s"
+    given = {"measure": measure, "key": key, "early_s": table.time_s[_EARLY]}
     if not (gained > 0).any():
-        return f"The {name_of(measure)} grew at no setting {early}."
+        return worded("limbs.j2", **given, turn="")
     limbs = fit_limbs(table.x, gained, table.gained_se[:, _EARLY])
-    turn = value_text(key, limbs.turn)
-    said = [f"The {name_of(measure)} grows fastest {early} at {turn}."]
-    sides = (("Up to there", "rises", limbs.rise), ("From there", "falls", limbs.fall))
-    for where, way, limb in sides:
-        if limb is None:
-            said.append(f"{where} too few settings lie to say how the rate {way}.")
-        else:
-            said.append(
-                f"{where} the rate {way} as {name_of(key)} to the power of {_exponent(limb)}."
-            )
-    return " ".join(said)
+    sides = (
+        ("Up to there", "rises", limbs.rise and _exponent(limbs.rise)),
+        ("From there", "falls", limbs.fall and _exponent(limbs.fall)),
+    )
+    return worded("limbs.j2", **given, turn=value_text(key, limbs.turn), sides=sides)
 
 
 def _exponent(limb: Limb) -> str:

@@ -47,7 +47,6 @@ def grain_size_pages(
 
     Parameters
     ----------
-    study : Study
     collected : Collected
         Of all runs.
     scenario : Scenario

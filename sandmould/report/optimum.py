@@ -18,12 +18,7 @@ from sandmould.report.bed_mode import BedMode
 from sandmould.report.curves import reported_lines
 from sandmould.report.robustness import RobustnessPages
 from sandmould.runs.columns import CPU_S, total_s
-from sandmould.runs.formatting import (
-    display_scale,
-    number,
-    unit_of,
-    with_margin,
-)
+from sandmould.runs.formatting import display_scale, number, unit_of, with_margin
 from sandmould.runs.templates import sentences, worded
 from sandmould.statistics.emulator import TooFewRunsError
 from sandmould.statistics.mean_tests import CONFIDENCE

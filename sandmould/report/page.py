@@ -38,21 +38,10 @@ from sandmould.report.estimate_section import EstimatePages, estimate_figures, e
 from sandmould.report.kinds.kind import Findings, KindPages
 from sandmould.report.kinds.registry import report_of
 from sandmould.report.method import own_measures_method, provenance_rows, statistics_method
-from sandmould.report.optimum import (
-    OptimumPages,
-    effort_sentence,
-    optimum_pages,
-    with_surface,
-)
+from sandmould.report.optimum import OptimumPages, effort_sentence, optimum_pages, with_surface
 from sandmould.report.pictured_runs import pictured_runs
 from sandmould.report.robustness import RobustnessPages
-from sandmould.report.tables import (
-    KeyNumber,
-    data_files,
-    key_numbers,
-    runs_table,
-    settings_table,
-)
+from sandmould.report.tables import KeyNumber, data_files, key_numbers, runs_table, settings_table
 from sandmould.runs.columns import RUN, finished
 from sandmould.runs.files import replaced, write_text
 from sandmould.runs.formatting import name_of, setting_text
@@ -67,12 +56,7 @@ from sandmould.study.collect import Collected, read_collected, read_provenance, 
 from sandmould.study.plan.ownership import owner_of, shipped_name
 from sandmould.study.plan.plan_files import FIGURES, SPHERES, STUDY_FILE, VERDICT_FILE, read_run
 from sandmould.study.rounds.round_log import read_rounds
-from sandmould.wording.answer import (
-    detail_sentences,
-    first_sentence,
-    limit_sentences,
-    reasons_text,
-)
+from sandmould.wording.answer import detail_sentences, first_sentence, limit_sentences, reasons_text
 from sandmould.wording.next_steps import (
     agreement_steps,
     answer_steps,
@@ -120,7 +104,10 @@ def write_report(study_folder: Path, out: Path) -> None:
     with replaced(out) as partial:
         partial.write_text(text, encoding="utf-8")
         write_figures(study_folder / FIGURES, environment, figures)
-        _write_beside(study_folder / SPHERES, beside)
+        shutil.rmtree(study_folder / SPHERES, ignore_errors=True)
+        for name, script in beside.items():
+            (study_folder / SPHERES).mkdir(exist_ok=True)
+            (study_folder / SPHERES / name).write_text(script, encoding="utf-8")
     write_text(study_folder / VERDICT_FILE, f"{first}\n")
 
 
@@ -313,14 +300,6 @@ def _first_screen(
     owner = owner_of(page.study_folder)
     after = with_file(steps, owner, shipped_name(owner), page.study_folder.name)
     return FirstScreen(headline, is_sound, figures, table, grounds, after)
-
-
-def _write_beside(folder: Path, scripts: Mapping[str, str]) -> None:
-    """Write the folder of scripts anew; none where there are none."""
-    shutil.rmtree(folder, ignore_errors=True)
-    for name, text in scripts.items():
-        folder.mkdir(exist_ok=True)
-        (folder / name).write_text(text, encoding="utf-8")
 
 
 def _beside_mode(page: Findings[Any], mode: BedMode | None) -> list[str]:

@@ -18,6 +18,7 @@ from sandmould.report.bed_mode import BedMode, Response, bed_mode
 from sandmould.report.tables import Cell, Column, Table
 from sandmould.runs.columns import STAGE, TIME_S
 from sandmould.runs.formatting import number
+from sandmould.runs.templates import worded
 from sandmould.scenario.scenario import Scenario
 from sandmould.scenario.stages import StageKind, is_filling
 from sandmould.scenario.vibration import STANDARD_GRAVITY_M_S2
@@ -60,8 +61,6 @@ def robustness_pages(
 
     Parameters
     ----------
-    study_folder : Path
-    study : Study
     collected : Collected
         Of all runs.
     scenario : Scenario
@@ -88,7 +87,7 @@ def robustness_pages(
         _spring_table(springs) if springs else None,
         _chart(responses) if responses else None,
         mode,
-        _column(mode, bool(responses)) if mode else "",
+        worded("spring_column.j2", it=mode, is_shaken=bool(responses)) if mode else "",
     )
 
 
@@ -167,19 +166,6 @@ def _chart(responses: Sequence[Response]) -> Chart:
         f"{number(frequency[peak])} Hz with {number(mean[peak])}.",
         tuple(lines),
     )
-
-
-def _column(mode: BedMode, is_shaken: bool) -> str:
-    """Frequency of a column of springs as deep as the bed, beside the bed's own."""
-    said = (
-        f"A column of the model's springs, {number(1e3 * mode.depth_m)} mm high, would resonate at "
-        f"about {number(mode.estimate_hz, 2)} Hz and at odd multiples. That is c/(4 H) with c = "
-        f"{number(mode.row_speed_m_s)} m/s of a row of grains"
-    )
-    if mode.is_measured:
-        own_hz = number(mode.measured_hz)
-        return f"{said}. Shaken weakly, the bed's own first resonance is at {own_hz} Hz."
-    return f"{said}; shaken weakly, the bed shows no resonance." if is_shaken else f"{said}."
 
 
 def _spring_table(springs: SpringCheck) -> Table:

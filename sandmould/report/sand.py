@@ -12,7 +12,7 @@ import numpy as np
 import pandas as pd
 from numpy.typing import NDArray
 
-from sandmould.analysis.layers import layer_table
+from sandmould.analysis.layers import tube_shares
 from sandmould.analysis.plots import LAYER_COLOURS
 from sandmould.bad_input import BadInputError
 from sandmould.drawing import figures
@@ -31,7 +31,8 @@ from sandmould.runs.columns import (
     VIBRATION_TIME_S,
     finished,
 )
-from sandmould.runs.formatting import listed, name_of, number, setting_text
+from sandmould.runs.formatting import listed, setting_text
+from sandmould.runs.templates import worded
 from sandmould.scenario.scenario import Scenario
 from sandmould.statistics.verdict import Verdict
 from sandmould.study.collect import Collected
@@ -105,7 +106,9 @@ def sand_pages(
         ),
         "moments": tuple(zip(headings, layers, strict=True)),
         "density_scale": scale,
-        "density_conclusion": _density_conclusion(median_kg_m3),
+        "density_conclusion": worded(
+            "density_course.j2", kg_m3=[d for d in median_kg_m3 if math.isfinite(d)]
+        ),
         "layer_colours": tuple(
             (n, LAYER_COLOURS[(n - 1) % len(LAYER_COLOURS)]) for n in range(1, number_of_layers + 1)
         ),
@@ -128,17 +131,14 @@ def _clock_s(moment: Moment) -> float:
 
 def _role_text(role: str, verdict: Verdict, summary: pd.DataFrame) -> str:
     """Why a run is the one to be looked at."""
-    if role == "only":
-        return f"the only one with a {name_of(verdict.measure)} that can be used"
-    if role == "longest":
-        none = "none gives a value that can be used" if finished(summary).any() else "none finished"
-        return f"which got farthest: {none}"
-    most = _value_words(verdict).get(role, role)
-    if role == "best" and verdict.best is not None and verdict.best.n > 1:
-        return f"in the middle of those with the {most} mean {name_of(verdict.measure)}"
-    if role == "median":
-        return f"the one in the middle by the {name_of(verdict.measure)} of single runs"
-    return f"the one with the {most} {name_of(verdict.measure)} of all single runs"
+    return worded(
+        "pictured.j2",
+        role=role,
+        measure=verdict.measure,
+        most=_value_words(verdict).get(role, role),
+        is_mean=verdict.best is not None and verdict.best.n > 1,
+        has_finished=finished(summary).any(),
+    )
 
 
 def _value_words(verdict: Verdict) -> dict[str, str]:
@@ -274,29 +274,15 @@ def _other_measures(scenario: Scenario, verdict: Verdict, own: Iterable[str]) ->
     return [m for m in (*fronts, *own, *_SECONDARY) if m != verdict.measure]
 
 
-def _density_conclusion(median_kg_m3: Sequence[float]) -> str:
-    finite = [d for d in median_kg_m3 if math.isfinite(d)]
-    if len(finite) < 2:
-        return ""
-    first, last = finite[0], finite[-1]
-    if number(first, 4) == number(last, 4):
-        return f"The median over all grains stayed at {number(last, 4)} kg/m³ during the vibration."
-    way = "rose" if last > first else "fell"
-    return (
-        f"The median over all grains {way} from {number(first, 4)} to {number(last, 4)} kg/m³ "
-        "during the vibration."
-    )
-
-
 def _layer_conclusion(snapshots: Sequence[Snapshot], scenario: Scenario) -> str:
     """Which layers the sand in the first tube came from, the largest share first."""
     if not snapshots or not scenario.scene.bores:
         return ""
     bore, last = scenario.scene.bores[0], snapshots[-1]
-    table = layer_table(last.position_m, last.radius_m, last.layer, bore)
+    found = tube_shares(last.position_m, last.radius_m, last.layer, bore)
     shares = [
         f"layer {layer} ({100 * share:.0f} %)"
-        for share, layer in sorted(zip(table.tube_share, table.layer, strict=True), reverse=True)
+        for share, layer in sorted(zip(found.values(), found, strict=True), reverse=True)
         if share >= 0.05
     ]
     name = bore.name.replace("_", " ")

@@ -312,15 +312,6 @@ def _why(row: Mapping[Any, Any], why: str) -> str:
     return " ".join(s for s in (meaning, detail) if s)
 
 
-@dataclass(frozen=True)
-class DataFile:
-    """A file of the study that the report links to."""
-
-    href: str
-    name: str
-    what: str
-
-
 _FILES = (
     (STUDY_FILE, "the study as planned"),
     ("runs.tsv", "the plan: every run, its parameters, replicate and seed"),
@@ -336,10 +327,10 @@ _FILES = (
 )  # fmt: skip
 
 
-def data_files(study_folder: Path, base_href: str) -> tuple[DataFile, ...]:
+def data_files(study_folder: Path, base_href: str) -> tuple[dict[str, str], ...]:
     """Files of the study that are there, with addresses seen from the report."""
     return tuple(
-        DataFile(f"{base_href}{name}", name, what)
+        {"href": f"{base_href}{name}", "name": name, "what": what}
         for name, what in _FILES
         if (study_folder / name).exists()
     )

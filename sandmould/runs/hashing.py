@@ -79,14 +79,11 @@ def _defaults(section: type[Section]) -> dict[str, Any]:
     """First default of each key; ``_ALWAYS`` where a key has none or names a variant."""
     return {
         key: _ALWAYS
-        if field.is_required() or _names_variant(field.annotation)
+        if field.is_required()
+        or (get_origin(field.annotation) is Literal and len(get_args(field.annotation)) == 1)
         else first_default(section, key)
         for key, field in section.model_fields.items()
     }
-
-
-def _names_variant(annotation: Any) -> bool:
-    return get_origin(annotation) is Literal and len(get_args(annotation)) == 1
 
 
 def solution_hash(scenario: Section, solver: str) -> str:

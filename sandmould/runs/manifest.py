@@ -65,7 +65,6 @@ def write_manifest(
 
     Parameters
     ----------
-    step : str
     origin : mapping, optional
         Provenance of what was computed.
     cost : mapping, optional
@@ -126,10 +125,7 @@ def deck_damage(folder: Path, manifest: Manifest) -> str:
 def damage(folder: Path, sizes: Mapping[str, Any]) -> str:
     """Say which file is missing or has another size; empty where all are as they were left.
 
-    Parameters
-    ----------
-    sizes : mapping of str to int
-        Bytes of each file, by its path from the folder.
+    ``sizes``: bytes of each file, by its path from the folder.
     """
     for name, size in sizes.items():
         try:

@@ -11,11 +11,7 @@ from pathlib import Path
 from typing import Any
 
 from sandmould.runs.checkpoint_folders import END_CHECKPOINT
-from sandmould.runs.manifest import (
-    OUTCOME_FILE,
-    files_below,
-    write_manifest,
-)
+from sandmould.runs.manifest import OUTCOME_FILE, files_below, write_manifest
 from sandmould.runs.outcome import RunOutcome
 
 

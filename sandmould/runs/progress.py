@@ -69,14 +69,11 @@ class Progress:
             return
         self._last_line_s = now
         bar = "#" * round(percent / 5)
-        ending = "done" if last else _left_text(left)
+        ending = f"about {duration_text(left)} left" if math.isfinite(left) else "time left unknown"
+        ending = "done" if last else ending
         print(
             f"{self._name}  [{bar:<20}] {percent:3.0f} %  {stage:<10} {time_s:8.3f} s simulated  "
             f"{rate / 1e6:5.2f} M {self._unit}/s  {ending}",
             file=sys.stderr,
             flush=True,
         )
-
-
-def _left_text(left_s: float) -> str:
-    return f"about {duration_text(left_s)} left" if math.isfinite(left_s) else "time left unknown"

@@ -17,17 +17,7 @@ def has_begun(work: Path) -> bool:
 
 
 def lay_tables(source: Path, work: Path, names: Iterable[str]) -> None:
-    """Give a run the tables that another one left, so that it writes on in them.
-
-    Parameters
-    ----------
-    source : Path
-        Folder of the products.
-    work : Path
-        Of the run; what it has of those names is replaced.
-    names : iterable of str
-        Files; those that the source lacks are left out.
-    """
+    """Give a run the tables that another one left, in place of its own: it writes on in them."""
     work.mkdir(parents=True, exist_ok=True)
     for name in names:
         if (source / name).exists():

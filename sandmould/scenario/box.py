@@ -64,9 +64,7 @@ class Box(Section):
     def holds(self, points_m: Array, dimension: int, slack: float = 1e-9) -> bool:
         """Whether points lie in the box, or out of it by no more than a share of its size.
 
-        Parameters
-        ----------
-        points_m : (n, d) float64, m
+        ``points_m``: (n, d) float64, m.
         """
         size_m = np.array(self.size_m(dimension))
         slack_m = slack * size_m.max()

@@ -90,10 +90,6 @@ CAVITY_KINDS = {2: ("box", "polygon"), 3: ("box", "cylinder", "mesh")}
 def inward(cavity: AnyCavity, dimension: int, key: str) -> Array:
     """Unit vector from the side that a cavity opens to into it, (d,) float64.
 
-    Parameters
-    ----------
-    cavity : cavity of any kind
-
     Raises
     ------
     BadInputError
@@ -115,10 +111,6 @@ def inward(cavity: AnyCavity, dimension: int, key: str) -> Array:
 
 def cavity_space(cavity: AnyCavity, dimension: int, key: str) -> Cavity:
     """Geometry of a cavity whose keys go together.
-
-    Parameters
-    ----------
-    cavity : cavity of any kind
 
     Raises
     ------

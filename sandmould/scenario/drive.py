@@ -31,11 +31,6 @@ class BoxDrive:
     """Amplitude: half of peak to peak."""
 
     @property
-    def end_to_end_m(self) -> float:
-        """From one end of the motion to the other."""
-        return 2.0 * self.displacement_m
-
-    @property
     def velocity_m_s(self) -> float:
         """Amplitude of the velocity."""
         return 2 * math.pi * self.frequency_hz * self.displacement_m

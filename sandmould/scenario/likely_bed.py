@@ -12,12 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from sandmould.geometry.geometry import Array, distance_within
-from sandmould.scenario.placement import (
-    filled_measure,
-    nominal_fraction,
-    plan_counts,
-    portion_of,
-)
+from sandmould.scenario.placement import filled_measure, nominal_fraction, plan_counts, portion_of
 from sandmould.scenario.scenario import Scenario
 
 MOST_DRAWN = {2: 80_000, 3: 30_000}

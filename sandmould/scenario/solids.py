@@ -249,10 +249,7 @@ class DrawnPart:
 def drawn_part(drawing: Drawing, box_m: Array) -> DrawnPart:
     """Measure a drawing whose file can be read.
 
-    Parameters
-    ----------
-    box_m : (3,) float64, m
-        Size of the box that it stands in.
+    ``box_m``, (3,) float64, m: size of the box that it stands in.
     """
     from sandmould.geometry.mesh_file import read_drawing  # see drawn_surface
 

@@ -12,15 +12,7 @@ from pydantic import BaseModel
 
 
 def standing_keys(model: type[BaseModel], tree: Any, parts: list[str]) -> list[str]:
-    """Keys of the section at a path, that of its kind where a union has several.
-
-    Parameters
-    ----------
-    tree : any
-        What was read for the model.
-    parts : list of str
-        Path of the section; positions in lists included.
-    """
+    """Keys of the section at a path in a tree, that of its kind where a union has several."""
     return sorted({name for m in _standing(model, tree, parts) for name in m.model_fields})
 
 

@@ -36,10 +36,7 @@ _SPELT = str.maketrans({"µ": "u", "μ": "u", "²": "2", "³": "3", "^": None, "
 def in_unit(value: object, stated: object, units: Iterable[str]) -> str:
     """Say which number to write for a value that is stated in another unit of the same kind.
 
-    Returns
-    -------
-    str
-        Such as ``write 0.00015 (m)``; empty where the units do not fit.
+    Such as ``write 0.00015 (m)``; empty where the units do not fit.
     """
     if isinstance(value, bool) or not isinstance(value, int | float):
         return ""

@@ -230,10 +230,6 @@ class VibrationStage(Shaking):
         wave = amplitude * np.sin(self.angular_frequency_rad_s * time_s)
         return np.where(moving, wave, 0.0)
 
-    def displacement_at(self, time_s: float, stops_smoothly: bool = False) -> float:
-        """See ``displacements_at``, at one time."""
-        return float(self.displacements_at(np.array(time_s), stops_smoothly))
-
 
 class RestStage(Section):
     """A stage in which the box stands and the sand comes to rest, as after a layer of the fill."""

@@ -110,11 +110,6 @@ def compare_pair(
     return tuple(comparisons)
 
 
-def agreement_table(compared: Sequence[Compared]) -> pd.DataFrame:
-    """``agreement.tsv``: one row a pair and measure."""
-    return pd.DataFrame([c.row() for c in compared], columns=list(COLUMNS))
-
-
 def interval_text(agreement: Agreement) -> str:
     """An interval as a table shows it."""
     low, high = agreement.ci

@@ -99,10 +99,7 @@ class Spread:
         Replicates that share their seeds are one block. Blocks count unless they do not link all
         settings, or take more than half of the degrees of freedom.
 
-        Parameters
-        ----------
-        values : mapping of label to Series of float
-            Of each setting, by block; one of them at least is not empty.
+        ``values``: of each setting, by block; one of them at least is not empty.
         """
         used = {label: v for label, v in values.items() if len(v)}
         run_value = np.concatenate([v.to_numpy(dtype=np.float64) for v in used.values()])

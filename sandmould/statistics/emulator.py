@@ -39,9 +39,7 @@ class Emulator:
     def at(self, points: Array) -> tuple[Array, Array]:
         """Mean and standard error of the mean at points.
 
-        Parameters
-        ----------
-        points : (n, d) float64
+        ``points``: (n, d) float64.
 
         Returns
         -------
@@ -54,9 +52,7 @@ class Emulator:
     def draws(self, points: Array, number: int, seed: int) -> Array:
         """Draw surfaces that the runs leave possible.
 
-        Parameters
-        ----------
-        points : (n, d) float64
+        ``points``: (n, d) float64.
 
         Returns
         -------
@@ -125,8 +121,9 @@ def fit_emulator(measure: str, points: Array, values: Array) -> Emulator:
         # A length at its bound says that the measure hardly depends on a key.
         warnings.simplefilter("ignore", ConvergenceWarning)
         process.fit(_scaled(distinct, low, high), (means - middle) / spread)
-    noise = math.sqrt(pooled) if freedom else spread * _white(process)
+    noise = math.sqrt(pooled) if freedom else math.nan
     if not freedom:
+        noise = spread * math.sqrt(float(process.kernel_.k2.noise_level))
         # What is asked for is the mean of a point, not one more run.
         process.kernel_ = process.kernel_.k1
     return Emulator(measure, low, high, noise, len(values), process, middle, spread)
@@ -135,7 +132,3 @@ def fit_emulator(measure: str, points: Array, values: Array) -> Emulator:
 def _scaled(points: Array, low: Array, high: Array) -> Array:
     scaled: Array = (points - low) / np.where(high > low, high - low, 1.0)
     return scaled
-
-
-def _white(process: Any) -> float:
-    return math.sqrt(float(process.kernel_.k2.noise_level))

@@ -94,7 +94,6 @@ def grain_changes(
         One row a run, those with coarser grains among them.
     keys : sequence of str
         Swept keys.
-    measures : sequence of str
     part : str
         What the runs with coarser grains are called in the summary.
     """
@@ -116,7 +115,6 @@ def order_of(best: GrainChange, rival: GrainChange, better: str) -> Literal["sam
     ----------
     best, rival : GrainChange
         Of one measure.
-    better : str
     """
     ahead = GrainChange({}, best.measure, rival.coarser, best.coarser)
     if not ahead.is_seen:

@@ -116,10 +116,6 @@ def find_optimum(
 ) -> Optimum:
     """Fit a surface through the runs and see where it may be best.
 
-    Parameters
-    ----------
-    better : {"larger", "smaller"}
-
     Raises
     ------
     TooFewRunsError

@@ -25,10 +25,7 @@ def propose(
     A point near one that has runs becomes a further replicate of that: so replicates come where
     the spread hides the best, and new points where the surface is not known.
 
-    Parameters
-    ----------
-    whole : collection of str
-        Keys that take whole numbers only.
+    ``whole``: keys that take whole numbers only.
     """
     keys = optimum.keys
     rng = np.random.default_rng([seed, runs])

@@ -66,10 +66,7 @@ def resolution_among(keys: Sequence[str]) -> str:
 def refining_of(key: str, at: Sequence[tuple[float, float]]) -> Refining | None:
     """Order sizes and their values; None where no two sizes are apart.
 
-    Parameters
-    ----------
-    at : sequence of (float, float)
-        Size and value of each level.
+    ``at``, sequence of (float, float): size and value of each level.
     """
     ordered = sorted((pair for pair in at if math.isfinite(pair[1])), reverse=True)
     sizes, values = tuple(size for size, _ in ordered), tuple(value for _, value in ordered)

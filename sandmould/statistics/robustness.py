@@ -118,7 +118,6 @@ def assess_robustness(
     key : str
         The swept frequency.
     certified_hz : sequence of float, Hz
-    objective : Objective
     margin : float or None
         Shift that counts as none, in the unit of the measure; None for ``SHARE`` of its mean at
         the optimum.

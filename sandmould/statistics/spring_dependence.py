@@ -118,6 +118,8 @@ def assess_springs(
 ) -> SpringCheck | None:
     """Say for each amplitude held whether there is an optimum, and whether it follows the springs.
 
+    None before the runs of the control are planned.
+
     Parameters
     ----------
     best_hz : float
@@ -130,11 +132,6 @@ def assess_springs(
     margin : float or None
         Drop that counts as none, in the unit of the measure; None for ``SHARE`` of its mean at the
         best frequency.
-
-    Returns
-    -------
-    SpringCheck or None
-        None before the runs of the control are planned.
     """
     if PART not in summary:
         return None

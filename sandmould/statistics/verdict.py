@@ -108,10 +108,6 @@ def _ranked(
 def rank_runs(summary: pd.DataFrame, measure: str, better: Better = "larger") -> dict[str, str]:
     """Best, median and worst usable run by the objective.
 
-    Parameters
-    ----------
-    better : {"larger", "smaller", "neither"}
-
     Returns
     -------
     dict

@@ -46,25 +46,14 @@ from sandmould.runs.columns import (
     TIME_S,
     VIBRATION_TIME_S,
     WALL_S,
+    finished,
 )
 from sandmould.runs.files import replaced
 from sandmould.runs.manifest import read_manifest
 from sandmould.runs.outcome import Outcome, RunOutcome
-from sandmould.runs.run_tables import (
-    PLACE,
-    RunTables,
-    problem_text,
-    read_costs,
-    read_tables,
-)
+from sandmould.runs.run_tables import PLACE, RunTables, problem_text, read_costs, read_tables
 from sandmould.scenario.reading import Origin, read_planned, validated
-from sandmould.statistics.agreement import (
-    Compared,
-    agreement_table,
-    compare_keys,
-    compare_pair,
-    sweep_part,
-)
+from sandmould.statistics.agreement import COLUMNS, Compared, compare_keys, compare_pair, sweep_part
 from sandmould.study.plan.plan_files import CHECKS, CURVES, STUDY_FILE, SUMMARY
 
 NO_OUTCOME = "no outcome written"
@@ -117,7 +106,7 @@ def collect(study_folder: Path) -> None:
     tables = {
         SUMMARY: sweep.summary,
         CURVES: sweep.curves,
-        "agreement.tsv": agreement_table(compared),
+        "agreement.tsv": pd.DataFrame([c.row() for c in compared], columns=list(COLUMNS)),
     }
     if len(sweep.summary) < len(gathered.summary):
         parts = gathered.summary, gathered.curves
@@ -379,9 +368,7 @@ def _with_clock(table: pd.DataFrame) -> pd.DataFrame:
     if missing:
         raise ValueError(f"no column {', '.join(missing)}")
     times = {name: pd.to_numeric(table[name]) for name in (TIME_S, VIBRATION_TIME_S)}
-    shaken_s = times[VIBRATION_TIME_S]
-    # older tables say -1 where nothing had vibrated yet
-    return table.assign(**times | {VIBRATION_TIME_S: shaken_s.where(shaken_s >= 0)})
+    return table.assign(**times)
 
 
 def read_provenance(folder: Path) -> dict[str, Any]:
@@ -390,3 +377,20 @@ def read_provenance(folder: Path) -> dict[str, Any]:
         return read_manifest(folder).get("origin", {})
     except (OSError, ValueError):
         return {}
+
+
+def failed_runs(study_folder: Path) -> None:
+    """Fail loudly when a run of the study failed.
+
+    Raises
+    ------
+    SystemExit
+        Naming each run that did not finish, with its outcome and what was said of it.
+    """
+    summary = read_summary(study_folder)
+    failed = summary[~finished(summary)].to_dict("records")
+    if failed:
+        lines = [f"  {row[RUN]}: {row[OUTCOME]}. {row[DETAIL]}".rstrip() for row in failed]
+        again = "A failed run is computed once more by: sandmould again RUN"
+        said = "\n".join([f"{len(failed)} of {len(summary)} runs did not finish:", *lines, again])
+        raise SystemExit(said)

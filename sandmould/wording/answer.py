@@ -38,7 +38,7 @@ NOTHING = 1e-3
 _MOST_LABELS = 8
 _WIDEST = 0.5
 """Half width of an interval of a share beyond which it says nothing."""
-_OF_DRIVE = ("frequency_hz", "acceleration_g", "velocity_m_s", "displacement_m")
+OF_DRIVE = ("frequency_hz", "acceleration_g", "velocity_m_s", "displacement_m")
 """Ends of swept keys that the motion of the box states."""
 REASONS = {
     "did not finish": "{} did not finish",
@@ -92,7 +92,7 @@ def why_unused(why: str) -> str:
 def place_text(label: str, keys: Sequence[str], drive: BoxDrive | None, more: str = "") -> str:
     """A setting as a person sets a table: ``50 Hz (±0.149 mm, 1.5 g)``."""
     said = {key.rpartition(".")[2] for key in keys}
-    if drive is None or not said.intersection(_OF_DRIVE):
+    if drive is None or not said.intersection(OF_DRIVE):
         return f"{label} ({more})" if more else label
     amplitude = f"±{1e3 * drive.displacement_m:.3g} mm"
     frequency = "" if "frequency_hz" in said else f" at {drive.frequency_hz:.3g} Hz"

@@ -18,7 +18,6 @@ def grain_sentences(
     ----------
     changes : sequence of GrainChange
         Of the objective, at the best setting and, where it was computed, at the next; not empty.
-    better : str
     narrow : sequence of str
         Tubes and cavities that fewer than five of the largest grains fit across.
     is_short : bool

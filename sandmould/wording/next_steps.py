@@ -2,12 +2,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 
 from sandmould.definition.certificate import frequency_key
 from sandmould.definition.study import Study
 from sandmould.runs.formatting import filled_space, listed, name_of, value_text
+from sandmould.runs.templates import worded
 from sandmould.statistics.answer import Answer, Decided
 from sandmould.statistics.config import fewest_points
 from sandmould.statistics.optimum import Optimum
@@ -19,32 +20,6 @@ WORTH = 30
 FINE_ENOUGH = 0.02
 """Share of a value that sizes of elements or steps may leave open."""
 OWN_FILE = "my_study.yaml"
-TEXTS: Mapping[str, str] = {
-    "again": "See in the table of runs why {runs} did not finish. Once the cause is gone, compute "
-    "{them} again:",
-    "longer": "Shake for longer (duration_s): the {measure} was still getting better.",
-    "beyond": "Try {a_key} {side} {value}: the sweep ends there.",
-    "turn": "Turn the {space}, widen its mouth or vent it: shaking does not fill it.",
-    "chance": "Run every setting at least {runs} times, to see how much chance matters.",
-    "more": "Run about {runs} more fillings of each setting: they would tell {settings} apart.",
-    "choose": "Choose between {settings} by what suits your machine.",
-    "finer": "Halve the finest {key} once more: the error is {percent:.0f} % of the value.",
-    "cheapest": "Leave the {key} at its cheapest value.",
-    "frequencies": "Sweep {fewest} frequencies or more: with fewer the best one cannot be found "
-    "between them.",
-    "certificate": "Before you trust a frequency in Hz, test whether it goes with the model's "
-    "springs or with what the table holds:",
-    "settings": "Add settings to the sweep, or runs to each of them.",
-    "outside": "Add {a_key} {side} what was swept: the best may lie there.",
-    "rounds": "Go on with more rounds: the interval is not yet as narrow as asked.",
-    "hold": "State with hold what your table really holds, and sweep again.",
-    "time_step": "Repeat it with a smaller time step (time_step.fraction) until the optimum stays.",
-    "wave_speed": "Say how fast waves run in your sand: the best frequency goes with that.",
-    "try": "Nothing is left to compute: try it on the real machine.",
-    "sand": "Use the sand in a study of your own:",
-    "take_cheapest": "Take the cheapest of them: it gives the same.",
-    "differ": "See in the table of comparisons which differ, and which need more runs.",
-}  # fmt: skip
 
 
 @dataclass(frozen=True)
@@ -69,8 +44,8 @@ class NextSteps:
 
 
 def step(name: str, line: str = "", command: str = "", **values: object) -> NextStep:
-    """A step by its name in ``TEXTS``."""
-    return NextStep(TEXTS[name].format(**values), line, command)
+    """A step by its name in ``next_step.j2``."""
+    return NextStep(worded("next_step.j2", step=name, **values), line, command)
 
 
 def with_file(steps: Sequence[NextStep], owner: str | None, shipped: str, name: str) -> NextSteps:

@@ -17,6 +17,7 @@ from sandmould.scenario.fill import Fill, Layer
 from sandmould.scenario.scenario import Scenario
 from sandmould.scenario.vibration import VibrationStage
 from tests.planned import write_plan
+from tests.snapshots import write_snapshots
 
 KEY = "vibration.0.frequency_hz"
 DURATION_S = 2.0
@@ -212,9 +213,7 @@ def write_run(
 ) -> None:
     made = snapshots(run, value, grains, count)
     made = made[: count // 3] if is_failed else made
-    (path / "snapshots").mkdir(parents=True)
-    for number, snapshot in enumerate(made):
-        snapshot.save(path / "snapshots" / f"{number:06d}.npz")
+    write_snapshots(path, made)
     rows = []
     for snapshot in made:
         share = 1 - np.exp(-2 * np.nan_to_num(snapshot.vibration_time_s))

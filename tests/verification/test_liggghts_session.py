@@ -131,7 +131,10 @@ def test_one_grain_moves_alike_in_both_frames(
             floor = session.triangle_loads("floor").corners_m[..., dimension - 1].mean()
             # s(t) from one step into the stage; the export prints six digits.
             t = (session.steps - session._stage_start - 1) * scene.step_s
-            course = vibration.displacement_at(t) * vibration.unit_direction(dimension)[-1]
+            course = (
+                float(vibration.displacements_at(np.array(t)))
+                * vibration.unit_direction(dimension)[-1]
+            )
             off_course.append(floor - (course if frame == "laboratory" else 0.0))
         session.close()
         tracks.append(np.array(track))

@@ -124,6 +124,4 @@ rule check:
     message:
         "Check that every run finished"
     run:
-        jobs.do_job(
-            "sandmould.execution.check:failed_runs", Path(FOLDER), log=log[0]
-        )
+        jobs.do_job("sandmould.study.collect:failed_runs", Path(FOLDER), log=log[0])

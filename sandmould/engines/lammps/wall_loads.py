@@ -19,11 +19,7 @@ class WallLoads:
     def __init__(self, lmp: Any, surfaces: Sequence[str], dimension: int) -> None:
         """Begin with no sample.
 
-        Parameters
-        ----------
-        lmp : lammps.lammps
-        surfaces : sequence of str
-            Walls and blocks, each with a compute of the deck.
+        ``surfaces``: walls and blocks, each with a compute of the deck.
         """
         self._lmp = lmp
         self._computes = [f"load_{name}" for name in surfaces]

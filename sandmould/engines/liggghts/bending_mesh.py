@@ -17,10 +17,7 @@ class BendingMesh:
     def __init__(self, name: str, vertices_m: Array) -> None:
         """Lie as drawn.
 
-        Parameters
-        ----------
-        vertices_m : (nv, 2) float64, m
-            Of the closed outline in order.
+        ``vertices_m``, (nv, 2) float64, m: of the closed outline in order.
         """
         self.name = name
         self._vertices_m = vertices_m

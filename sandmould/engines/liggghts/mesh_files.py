@@ -23,11 +23,8 @@ def surface_triangles(
 ) -> dict[str, Array]:
     """Triangulate all walls, blocks and outlines, and take meshes as they are.
 
-    Parameters
-    ----------
-    simulation_box : list of (low, high), m
-        One pair for each of three axes; the triangles stay well inside, as LIGGGHTS drops those
-        that leave it.
+    ``simulation_box``, list of (low, high), m: one pair for each of three axes; the triangles stay
+    well inside, as LIGGGHTS drops those that leave it.
 
     Returns
     -------
@@ -118,9 +115,7 @@ def _cuboid(block: Block) -> Array:
 def write_stl(path: Path, name: str, triangles_m: Array) -> None:
     """Write triangles as an ASCII STL file, every number exact.
 
-    Parameters
-    ----------
-    triangles_m : (n, 3, 3) float64, m
+    ``triangles_m``: (n, 3, 3) float64, m.
     """
     normals = np.cross(triangles_m[:, 1] - triangles_m[:, 0], triangles_m[:, 2] - triangles_m[:, 0])
     normals /= np.linalg.norm(normals, axis=1)[:, None]

@@ -16,11 +16,7 @@ from sandmould.engines.deck_context import deck_context
 from sandmould.engines.deck_lines import Lines, simulation_box, size_classes
 from sandmould.engines.liggghts import OLDEST_VERSION
 from sandmould.engines.liggghts.contact_model import pair_tables, rolling_model
-from sandmould.engines.liggghts.mesh_files import (
-    largest_motion_m,
-    surface_triangles,
-    write_stl,
-)
+from sandmould.engines.liggghts.mesh_files import largest_motion_m, surface_triangles, write_stl
 from sandmould.engines.program import Program
 from sandmould.geometry.geometry import Array
 from sandmould.scenario.placement import PlannedLayer

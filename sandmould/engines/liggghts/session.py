@@ -14,12 +14,7 @@ from sandmould.engines.deck_session import DeckSession
 from sandmould.engines.liggghts.bending_mesh import BendingMesh
 from sandmould.engines.liggghts.grains_file import read_grains
 from sandmould.engines.liggghts.mesh_files import outline_strips, write_stl
-from sandmould.engines.liggghts.process import (
-    Conversation,
-    LiggghtsDied,
-    executable,
-    version_of,
-)
+from sandmould.engines.liggghts.process import Conversation, LiggghtsDied, executable, version_of
 from sandmould.engines.liggghts.refusals import refuse
 from sandmould.engines.liggghts.render import atoms_data, surface_meshes
 from sandmould.engines.liggghts.vtk_stress import TriangleLoads, read_triangle_loads
@@ -48,10 +43,7 @@ class LiggghtsSession(DeckSession):
     ) -> None:
         """Start LIGGGHTS on a deck, afresh or from a checkpoint.
 
-        Parameters
-        ----------
-        log : Path
-            LIGGGHTS's own log; files that are read at once lie beside it.
+        ``log``: LIGGGHTS's own log; files that are read at once lie beside it.
 
         Raises
         ------

@@ -56,7 +56,6 @@ def _set_motion(walls: Walls, mover: _Mover, step: int) -> None:
 @njit(**OPTIONS)
 def _advance(
     dim: Any,
-    first_step: int,
     steps: int,
     drifted: bool,
     scene: DemScene,
@@ -67,6 +66,7 @@ def _advance(
     threads: int,
     team: Team,
     mover: _Mover,
+    first_step: int,
 ) -> tuple[int, int]:
     """See ``steps.advance``, which computes every step; the mover comes before each."""
     walls = moving.walls
@@ -112,24 +112,6 @@ class MovedSolver(TableSolver):
         rows = slice(mover.addresses[2], mover.addresses[2] + len(mover.load))
         mover.sum[:] = loads[:, rows].sum(axis=0)
         loads[:, rows] = 0.0
-
-        def run_thread(thread: int, threads: int, team: Team) -> tuple[int, int]:
-            ended: tuple[int, int] = _advance(
-                self._dim,
-                self.steps,
-                steps,
-                drifted,
-                self.scene,
-                self.moving,
-                displacement_m,
-                0.5 * self._skin,
-                thread,
-                threads,
-                team,
-                mover,
-            )
-            return ended
-
-        ended = self._together(run_thread)
+        ended = self._together(_advance, steps, drifted, displacement_m, mover, self.steps)
         loads[0, rows] = mover.sum
         return ended

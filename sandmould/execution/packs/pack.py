@@ -10,7 +10,7 @@ from pathlib import Path
 from sandmould.bad_input import BadInputError, Problem
 from sandmould.definition.run import FILLS
 from sandmould.digest import file_digest
-from sandmould.engines.snapshot_file import OLDER, SNAPSHOTS, SnapshotFile, stored_snapshots
+from sandmould.engines.snapshot_file import SNAPSHOTS, SnapshotFile, stored_snapshots
 from sandmould.execution.packs.archive import AT_END, SUFFIX, place_of, reasons_lines, write_pack
 from sandmould.runs.formatting import listed, size_text
 from sandmould.runs.manifest import (
@@ -26,7 +26,7 @@ from sandmould.study.plan.build_plan import Plan, writing
 from sandmould.study.plan.trust import carried
 from sandmould.study.rounds.round_log import ROUNDS_FILE
 
-_EARLIER = (SNAPSHOTS, f"{OLDER}/", "exports")
+_EARLIER = (SNAPSHOTS, "exports")
 """How the names of files begin that show how a run came to its end."""
 
 

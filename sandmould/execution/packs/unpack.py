@@ -12,13 +12,7 @@ from sandmould.bad_input import BadInputError
 from sandmould.definition.run import FILLS
 from sandmould.digest import file_digest
 from sandmould.execution.locks import is_locked, take_turn
-from sandmould.execution.packs.archive import (
-    AT_END,
-    SCENARIO_FILE,
-    Pack,
-    open_pack,
-    reasons_lines,
-)
+from sandmould.execution.packs.archive import AT_END, SCENARIO_FILE, Pack, open_pack, reasons_lines
 from sandmould.runs.files import replaced
 from sandmould.runs.manifest import DECK_FILE, OUTCOME_FILE
 from sandmould.runs.products import LAST_WORK

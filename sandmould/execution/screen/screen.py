@@ -16,7 +16,7 @@ from rich.live import Live
 from sandmould.execution.cluster.queue import Job, Outlook, jobs_of, outlook
 from sandmould.execution.screen.run_watch import Ended, Running, RunWatch, failure, file_time_s
 from sandmould.execution.screen.table import counts_text, study_table, times_text
-from sandmould.execution.screen.view import RunView, StudyView
+from sandmould.execution.screen.view import StudyView
 from sandmould.execution.time_left import TimeLeft
 from sandmould.runs.progress import duration_text
 from sandmould.runs.words import Words
@@ -136,7 +136,8 @@ class Screen:
             self._print(words)
         all_ended = self._watch.look()
         for run in all_ended:
-            self._learn(run.run)
+            wall_s = computed_wall_s(self._folders[run.run])
+            self._time_left_known(begun=True).learn(run.run, wall_s)
         # Runs tell of a fill that failed.
         ended = [run for run in all_ended if run.run not in self._fills]
         for run in ended:
@@ -164,9 +165,6 @@ class Screen:
             self._print(f"and {len(untold) - most} more failed: the report lists them")
         if self.failures:
             self._print("A failed run is computed once more by: sandmould again RUN")
-
-    def _learn(self, run: str) -> None:
-        self._time_left_known(begun=True).learn(run, computed_wall_s(self._folders[run]))
 
     def _end(self, run: Ended) -> None:
         self._so_far_known().add([run.run])
@@ -211,9 +209,8 @@ class Screen:
             name=self._plan.study.name,
             runs=len(self._plan.runs),
             done=self._done,
-            failed=len(self.failures),
             running=tuple(
-                RunView(at, time_left.seconds_of(run, shares[run])) for run, at in running.items()
+                (at, time_left.seconds_of(run, shares[run])) for run, at in running.items()
             ),
             waiting=len([run for run in waiting if run not in self._fills]),
             filling=len([run for run in running if run in self._fills]),

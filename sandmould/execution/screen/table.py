@@ -7,7 +7,8 @@ from rich.console import Group, RenderableType
 from rich.table import Table
 from rich.text import Text
 
-from sandmould.execution.screen.view import RunView, StudyView
+from sandmould.execution.screen.run_watch import Running
+from sandmould.execution.screen.view import StudyView
 from sandmould.runs.progress import duration_text
 
 _FEWEST_ROWS = 3
@@ -45,7 +46,7 @@ def counts_text(view: StudyView) -> str:
     parts = [
         f"{number} {what}"
         for number, what in (
-            (view.failed, "failed"), (len(view.running) - view.filling, "running"),
+            (len(view.failures), "failed"), (len(view.running) - view.filling, "running"),
             (view.waiting, "waiting"),
         )
         if number
@@ -78,14 +79,13 @@ def _bar(share: float, width: int) -> Text:
     return Text(f"[{'#' * full}{'.' * (width - 2 - full)}]", no_wrap=True)
 
 
-def _running_table(running: tuple[RunView, ...], width: int) -> Table:
-    names = max((cell_len(each.at.run) for each in running), default=0)
+def _running_table(running: tuple[tuple[Running, float], ...], width: int) -> Table:
+    names = max((cell_len(at.run) for at, _ in running), default=0)
     name_width = min(max(names, 3), int(_NAME_SHARE * width))
     table = Table.grid(padding=(0, 1))
-    for each in running:
-        at = each.at
+    for at, left_s in running:
         name = set_cell_size(_cut(at.run, name_width), name_width)
-        left = f"{duration_text(each.left_s)} left" if each.left_s >= 1.0 else "soon"
+        left = f"{duration_text(left_s)} left" if left_s >= 1.0 else "soon"
         cells: list[RenderableType] = [
             Text(name, no_wrap=True),
             _bar(at.percent / 100, 22 if width >= _WIDE else 12),

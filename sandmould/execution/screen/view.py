@@ -8,14 +8,6 @@ from sandmould.execution.screen.run_watch import Ended, Running
 
 
 @dataclass(frozen=True)
-class RunView:
-    """A run that is being computed, with what it will still take."""
-
-    at: Running
-    left_s: float
-
-
-@dataclass(frozen=True)
 class StudyView:
     """A study that is being computed."""
 
@@ -24,8 +16,8 @@ class StudyView:
     """All of the study, those of earlier starts included."""
     done: int
     """Those that reached their end."""
-    failed: int
-    running: tuple[RunView, ...]
+    running: tuple[tuple[Running, float], ...]
+    """Runs that are being computed, each with the time that it will still take, s."""
     waiting: int
     filling: int
     """Of what is running, the fills that runs share; they are no runs."""

@@ -20,10 +20,7 @@ _NO_DRIVE = BoxDrive(np.nan, np.nan)
 def add_drive(scenario: Scenario, table: pd.DataFrame, folder: Path) -> pd.DataFrame:
     """Add the amplitudes of the box's motion up to each snapshot.
 
-    Parameters
-    ----------
-    table : DataFrame
-        Measures of a run's snapshots, in order of time.
+    ``table``: measures of a run's snapshots, in order of time.
 
     Returns
     -------

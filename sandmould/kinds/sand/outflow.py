@@ -139,10 +139,7 @@ def _surface_of(
 def outflow_time_s(table: pd.DataFrame) -> float:
     """Time from the opening of the gate until most of what flows out is out.
 
-    Parameters
-    ----------
-    table : DataFrame
-        Rows of ``measures.tsv`` in order of time.
+    ``table``: rows of ``measures.tsv`` in order of time.
 
     Returns
     -------

@@ -24,10 +24,7 @@ def lay_fill(run: Run, folder: Path, program: Program) -> Computed | None:
 
     A fill that cannot be used is told on standard error, and the run fills by itself.
 
-    Parameters
-    ----------
-    folder : Path
-        ``results/<study>/runs/<run>``; the fills of the study lie beside the runs.
+    ``folder``: ``results/<study>/runs/<run>``; the fills of the study lie beside the runs.
 
     Returns
     -------

@@ -99,10 +99,6 @@ def packed_w_m_k(solid_fraction: float) -> Curve:
 
     Zehner and Schluender, Chemie Ingenieur Technik 42 (1970) 933-941: round grains, in whose unit
     cell heat passes grain and gas in parallel.
-
-    Parameters
-    ----------
-    solid_fraction : float
     """
     at = np.linspace(300.0, 1300.0, 41)
     gas = along(AIR_W_M_K, at)

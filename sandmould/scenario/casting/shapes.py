@@ -184,11 +184,7 @@ class Pixels:
 def solid_of(shape: Any, key: str) -> Body:
     """Geometry of a shape.
 
-    Parameters
-    ----------
-    shape : Shape
-    key : str
-        Key path of the shape, for messages.
+    ``key``: key path of the shape, for messages.
 
     Raises
     ------

@@ -36,7 +36,6 @@ def worths(
 
     Parameters
     ----------
-    emulators : mapping of measure to Emulator
     first : str
         The measure that is there already.
     cpu_s : mapping of measure to float, s

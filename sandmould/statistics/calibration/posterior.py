@@ -107,12 +107,7 @@ def posterior(
     Each says that the mean of its measure is its value, within its own deviation and the standard
     error of the emulator together.
 
-    Parameters
-    ----------
-    emulators : mapping of measure to Emulator
-    targets : mapping of measure to Target
-    assumed : sequence of Target or None
-        What is assumed of the two parameters themselves.
+    ``assumed``: what is assumed of the two parameters themselves.
 
     Raises
     ------

@@ -70,10 +70,7 @@ def calibrate(
 ) -> Calibrated:
     """Calibrate all sands of a study.
 
-    Parameters
-    ----------
-    others : mapping of study to DataFrame, optional
-        Summaries of the studies that ``calibration.also`` names.
+    ``others``: summaries of the studies that ``calibration.also`` names.
     """
     emulators: dict[str, Emulator] = {}
     tables: dict[str, pd.DataFrame] = {}

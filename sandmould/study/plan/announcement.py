@@ -33,12 +33,9 @@ def announce(
 ) -> str:
     """Write the plan to disk and say what it will take.
 
-    Parameters
-    ----------
-    measure : {"nothing", "engines", "all"}
-        What is measured first where this machine's speed is not known, which takes seconds an
-        engine. With "nothing" no engine starts, and the price is an estimate there. With "engines"
-        a program of the user's is not started: that is left to the start of its runs, "all".
+    ``measure``: what is measured first where this machine's speed is not known, which takes seconds
+    an engine. With "nothing" no engine starts, and the price is an estimate there. With "engines" a
+    program of the user's is not started: that is left to the start of its runs, "all".
     """
     write_files(plan, results)
     if measure == "all" or (measure == "engines" and plan.kind.planning.program is None):
@@ -64,10 +61,7 @@ def prepare(
 ) -> str:
     """Note for Snakemake what each run lacks, and which batches lack nothing.
 
-    Parameters
-    ----------
-    found : dict, optional
-        What runs lack; ``plan.lacks`` says so unless it is given.
+    ``found``: what runs lack; ``plan.lacks`` says so unless it is given.
 
     Returns
     -------

@@ -124,10 +124,7 @@ def _even(runs: Sequence[Run], parts: int, at_once: int, least: int) -> list[lis
 def mark_done(batches: Iterable[Batch], lacking: Container[str], folder: Path) -> None:
     """Mark batches whose runs lack nothing, such as unpacked ones, so that no job looks at them.
 
-    Parameters
-    ----------
-    lacking : container of str
-        Names of runs that lack something.
+    ``lacking``: names of runs that lack something.
     """
     for batch in batches:
         if batch.runs[0].part == FILL:

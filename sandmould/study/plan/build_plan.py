@@ -182,10 +182,7 @@ def study_path(configfiles: Sequence[Path], overrides: Mapping[str, Any]) -> Pat
 def open_plan(path: Path, results: Path = RESULTS, text: str | None = None) -> Plan:
     """Open, validate and expand a study.
 
-    Parameters
-    ----------
-    text : str, optional
-        What the study's file will hold, where it is not written yet.
+    ``text``: what the study's file will hold, where it is not written yet.
 
     Raises
     ------

@@ -20,10 +20,7 @@ LEAST_RUNS = 2
 def share_fills(runs: Sequence[Run], planning: Planning[Any]) -> tuple[list[Run], list[Run]]:
     """Find the fills that runs have in common.
 
-    Parameters
-    ----------
-    runs : sequence of Run
-        All of a study, those of earlier rounds included: what is appended shares with them.
+    ``runs``: all of a study, those of earlier rounds included: what is appended shares with them.
 
     Returns
     -------

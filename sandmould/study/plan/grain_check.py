@@ -23,7 +23,6 @@ def affordable_runs(study: OpenStudy, best: Sequence[Point], planned: Sequence[R
 
     Parameters
     ----------
-    study : OpenStudy
     best : sequence of Point
         The best first.
     planned : sequence of Run

@@ -151,10 +151,7 @@ def note_lacks(runs: Iterable[Run], found: dict[str, Lack], folder: Path) -> str
     file whose successors are there, and never of a damaged one. A note of a run that lacks nothing
     any more is removed: it may be newer than a deck that was rendered before it.
 
-    Parameters
-    ----------
-    found : dict
-        What those that are not whole lack, see ``lacks``.
+    ``found``: what those that are not whole lack, see ``lacks``.
 
     Returns
     -------

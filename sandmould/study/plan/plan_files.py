@@ -4,14 +4,15 @@ from __future__ import annotations
 
 import json
 from collections.abc import Sequence
+from dataclasses import MISSING, fields
 from functools import cache
 from pathlib import Path
-from typing import Any
+from typing import Any, get_type_hints
 
 import yaml
 from pydantic import create_model
 
-from sandmould.definition.run import FILL, Part, Run
+from sandmould.definition.run import FILL, Run
 from sandmould.definition.study import Study
 from sandmould.definition.sweep import Point
 from sandmould.digest import SHORT, digest
@@ -48,28 +49,19 @@ LISTED_POINTS = 20
 _Dumper: Any = getattr(yaml, "CSafeDumper", yaml.SafeDumper)
 
 
-class _RunFile(Section):
-    """What ``scenario.yaml`` holds; the type of its scenario is that of its kind."""
-
-    kind: str
-    study: str
-    run: str
-    parameters: dict[str, Any]
-    replicate: int
-    scenario: Any
-    sources: dict[str, str]
-    part: Part = "sweep"
-    fill: str = ""
-
-
-_OF_RUN = tuple(name for name in _RunFile.model_fields if name != "kind")
-
-
 @cache
-def _file_model(kind: str) -> type[_RunFile]:
-    """Type of the run files of a kind."""
-    scenario: Any = kind_named(kind).scenario
-    return create_model("RunFile", __base__=_RunFile, scenario=(scenario, ...))
+def _file_model(kind: str) -> Any:
+    """What ``scenario.yaml`` of a run holds; the type of its scenario is that of its kind."""
+    types = get_type_hints(Run) | {"scenario": kind_named(kind).scenario}
+    values: dict[str, Any] = {
+        each.name: (types[each.name], ... if each.default is MISSING else each.default)
+        for each in fields(Run)
+    }
+    return create_model("RunFile", __base__=Section, kind=(str, ...), **values)
+
+
+def _of_run(run: Any) -> dict[str, Any]:
+    return {each.name: getattr(run, each.name) for each in fields(Run)}
 
 
 def write_plan(runs: Sequence[Run], folder: Path) -> None:
@@ -98,7 +90,7 @@ def write_run(run: Run, folder: Path) -> Path:
     """Write the ``scenario.yaml`` of a run that is to be computed, unless it says so already."""
     place = folder / run.place
     kind = kind_of(run.scenario).name
-    file = _file_model(kind)(kind=kind, **{name: getattr(run, name) for name in _OF_RUN})
+    file = _file_model(kind)(kind=kind, **_of_run(run))
     # Most of a plan's time would be YAML, so the first line says what the others come from.
     state = digest(file.model_dump_json())[:SHORT]
     head = f"# Written by the plan, state {state}. Change the study instead.\n"
@@ -175,7 +167,7 @@ def read_run(path: Path) -> Run:
     tree = read_planned(path, file_name)
     kind = kind_named(tree.get("kind", ""), file_name).name
     file = validated(_file_model(kind), tree, Origin({"": file_name}))
-    return Run(**{name: getattr(file, name) for name in _OF_RUN})
+    return Run(**_of_run(file))
 
 
 def plan_table(runs: Sequence[Run], prices: Prices, cores: int) -> str:

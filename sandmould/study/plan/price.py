@@ -85,10 +85,7 @@ def ratios_of(
 ) -> dict[SpeedClass, float]:
     """How much longer finished runs took than was foretold of them, by class: the median.
 
-    Parameters
-    ----------
-    finished : iterable of (Run, float)
-        Runs with the wall time of their computation in s.
+    ``finished``, iterable of (Run, float): runs with the wall time of their computation in s.
     """
     found: dict[SpeedClass, list[float]] = {}
     for run, wall_s in finished:

@@ -17,10 +17,7 @@ from sandmould.study.plan.load_study import OpenStudy, from_root
 def outside(study: OpenStudy, scenario: AnyScenario) -> list[Problem]:
     """Files of a user's program that lie where the study does not allow; links are followed.
 
-    Parameters
-    ----------
-    scenario : scenario of the study's kind
-        Of any point: files can be swept.
+    ``scenario``: that of any point, since files can be swept.
 
     Returns
     -------

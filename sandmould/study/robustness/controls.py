@@ -43,7 +43,6 @@ def cases(checks: RobustnessChecks, scenario: Scenario, best_hz: float) -> Itera
 
     Parameters
     ----------
-    checks : RobustnessChecks
     scenario : Scenario
         Of the study.
     best_hz : float, Hz

@@ -12,6 +12,7 @@ from sandmould.definition.study import Study
 from sandmould.definition.sweep import is_whole, points
 from sandmould.runs.columns import CPU_S, REPLICATE, total_s
 from sandmould.runs.formatting import listed, name_of, number, setting_text, unit_of
+from sandmould.runs.templates import worded
 from sandmould.statistics.emulator import TooFewRunsError
 from sandmould.statistics.optimum import Optimum, find_optimum
 from sandmould.statistics.propose import propose
@@ -89,10 +90,8 @@ def choose_controls(
     ------
     TooFewRunsError
     """
-    objective = study.objective
-    optimum = find_optimum(summary, keys, objective.measure, objective.better)
-    best_hz = optimum.setting[keys[0]]
-    return replace(log, certified_hz=round_best_hz(best_hz))
+    optimum = find_optimum(summary, keys, study.objective.measure, study.objective.better)
+    return replace(log, certified_hz=round_best_hz(optimum.setting[keys[0]]))
 
 
 def next_replicates(
@@ -163,25 +162,24 @@ def _intervals(optimum: Optimum, keys: list[str]) -> str:
 
 def decision_text(log: RoundLog, study: Study) -> str:
     """One line on the last decision, for the terminal."""
-    if log.ended and log.certified_hz:
-        frequencies = listed([number(f) for f in log.certified_hz])
-        controls = listed([c.replace("_", " ") for c in study.certificate.controls], most=8)
-        return f"{log.ended} The controls of the optimum at {frequencies} Hz: {controls}."
-    if log.ended:
-        return log.ended
-    last = log.rounds[-1]
-    of = f"Round {len(log.rounds)} of at most {study.refine.rounds}"
-    if study.refine.adds == "replicates":
+    last, best = log.rounds[-1] if log.rounds else None, ""
+    if last and study.refine.adds == "replicates":
         best = setting_text(last.setting)
-        what = f"{len(last.runs)} more runs of settings that are not ruled out"
-        return f"{of}: best so far is {best}; {what}."
-    where = listed(
-        [
-            f"{name_of(key)} {number(value)} ({number(last.interval[key][0])} to "
-            f"{number(last.interval[key][1])}) {unit_of(key)}".rstrip()
-            for key, value in last.setting.items()
-        ]
+    elif last:
+        best = listed(
+            [
+                f"{name_of(key)} {number(value)} ({number(last.interval[key][0])} to "
+                f"{number(last.interval[key][1])}) {unit_of(key)}".rstrip()
+                for key, value in last.setting.items()
+            ]
+        )
+    return worded(
+        "decision.j2",
+        log=log,
+        controls=[control.replace("_", " ") for control in study.certificate.controls],
+        most=study.refine.rounds,
+        adds=study.refine.adds,
+        best=best,
+        last=last,
+        fresh=sum(replicate == 1 for _, replicate in last.runs) if last else 0,
     )
-    fresh = sum(replicate == 1 for _, replicate in last.runs)
-    more = len(last.runs) - fresh
-    return f"{of}: best so far is {where}; {fresh} new points and {more} more replicates."

@@ -68,18 +68,6 @@ def test_centres_inside_and_grains_outside_the_tubes_wall(bore):
     assert alone.grains_inside == 0
 
 
-@pytest.mark.parametrize("bore", [tube_2d(), tube_3d()])
-def test_profile_adds_up(bore):
-    rng = np.random.default_rng(3)
-    across = rng.uniform(-2.0, 2.0, (200, len(bore.axis) - 1))
-    position = bore.mouth_m + rng.uniform(-2, 12, (200, 1)) * bore.axis + across @ bore.basis
-    got = tube_fill(position, rng.uniform(0.1, 0.6, 200), bore, np.linspace(0.0, 10.0, 8))
-    assert len(got.profile_fraction) == 7
-    assert got.profile_fraction.mean() == pytest.approx(got.fill_fraction, rel=1e-6)
-    assert got.profile_fraction.min() > 0.0
-
-
 def test_empty_tube():
     got = tube_fill(np.zeros((0, 2)), np.zeros(0), tube_2d())
     assert (got.sand_measure, got.fill_fraction, got.grains_inside, got.front_depth_m) == (0,) * 4
-    assert len(got.profile_fraction) == len(got.depth_edges_m) == 0

@@ -13,10 +13,11 @@ import pytest
 from sandmould import ROOT
 from sandmould.drawing.animation import ABSENT, Film, make_film
 from sandmould.drawing.figures import cut_m, section_of
-from sandmould.engines.snapshot import Snapshot
+from sandmould.engines.snapshot_file import stored_snapshots
 from sandmould.kinds.sand.moments import list_moments, nearest
 from sandmould.study.plan.expand import expand
 from sandmould.study.plan.load_study import open_study
+from tests.snapshots import damage, write_snapshots
 from tests.unit.report_study import write_study
 
 
@@ -82,8 +83,8 @@ def test_frames_are_dropped_to_keep_the_budget_and_grains_never(tmp_path: Path) 
 def test_broken_snapshots_are_passed_over(tmp_path: Path) -> None:
     study = write_study(tmp_path / "tube", {50.0: 0.5}, 1, ())
     folder = study / "runs" / "f50_r1"
-    (folder / "snapshots" / "000003.npz").write_bytes(b"")
-    (folder / "snapshots" / "000004.npz").write_bytes(b"PK\x03\x04")
+    damage(folder, 3)
+    damage(folder, 4)
     film = make_film(folder, "best")
     assert film is not None
     assert len(film.time_s) == 10
@@ -111,12 +112,14 @@ def test_nearest_moment(tmp_path: Path) -> None:
 
 def test_grain_that_is_lost_is_absent_afterwards(tmp_path: Path) -> None:
     study = write_study(tmp_path / "tube", {50.0: 0.5}, 1, ())
-    path = study / "runs" / "f50_r1" / "snapshots" / "000011.npz"
-    last = Snapshot.load(path)
+    folder = study / "runs" / "f50_r1"
+    *before, whole = stored_snapshots(folder)
+    last = whole.load()
     kept = last.id != 7
     names = ("id", "layer", "position_m", "velocity_m_s", "spin_rad_s", "radius_m")
-    replace(last, **{name: getattr(last, name)[kept] for name in names}).save(path)
-    film = make_film(study / "runs" / "f50_r1", "best")
+    lacking = replace(last, **{name: getattr(last, name)[kept] for name in names})
+    write_snapshots(folder, [lacking], after=len(before))
+    film = make_film(folder, "best")
     assert film is not None
     metres, _, _ = unpack(film)
     assert np.isnan(metres[:, -1, 6]).all()

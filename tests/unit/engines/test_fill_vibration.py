@@ -97,7 +97,7 @@ def test_grains_of_every_layer_stand_still_where_nothing_pulls(
                 session.start_stage(stage)
             for _ in range(30):
                 now = bench.advance(2.3e-3)
-                s = whole.displacement_at(now.time_s - session.step_s, True)
+                s = whole.displacements_at(np.array(now.time_s - session.step_s), True)
                 places.append(now.position_m + s * direction)
                 if session.stage_over:
                     break

@@ -122,7 +122,7 @@ def test_every_engine_moves_the_box_so(engine: str, frame: str) -> None:
         while True:
             now = bench.advance(1.7e-3)
             t = now.time_s - bench.session.step_s
-            course = start - shaken.displacement_at(t, True) * np.array(direction)
+            course = start - shaken.displacements_at(np.array(t), True) * np.array(direction)
             off_course.append(np.abs(now.position_m[0] - course).max())
             if bench.session.stage_over:
                 bench.session.end_stage()

@@ -1,4 +1,4 @@
-"""Snapshots in files: what is absent there, and what older files have instead."""
+"""Snapshots in files: what is absent there."""
 
 from __future__ import annotations
 
@@ -30,12 +30,3 @@ def test_time_of_vibration_is_absent_before_it(tmp_path: Path, shaken_s: float) 
     (one,) = stored_snapshots(tmp_path)
     np.testing.assert_equal(one.times_s(), (0.1, shaken_s))
     np.testing.assert_equal(one.load().vibration_time_s, shaken_s)
-
-
-def test_older_files_have_minus_one(tmp_path: Path) -> None:
-    path = tmp_path / "snapshots" / "000000.npz"
-    path.parent.mkdir()
-    np.savez(path, **FILLING.arrays() | {"vibration_time_s": -1.0})
-    assert math.isnan(Snapshot.load(path).vibration_time_s)
-    (one,) = stored_snapshots(tmp_path)
-    np.testing.assert_equal(one.times_s(), (0.1, math.nan))

@@ -15,6 +15,7 @@ import pytest
 from sandmould import ROOT
 from sandmould.definition.run import Run
 from sandmould.engines.snapshot import Snapshot
+from sandmould.engines.snapshot_file import stored_snapshots
 from sandmould.execution import records
 from sandmould.kinds.sand.exports import write_exports, write_picture
 from sandmould.kinds.sand.measure import write_measures, write_profile
@@ -25,6 +26,7 @@ from sandmould.study.plan.plan_files import read_run
 from sandmould.study.rounds.round_log import ROUNDS_FILE, Round, RoundLog, basis_of, write_rounds
 from tests.planned import write_plan
 from tests.scenes import tube_scene
+from tests.snapshots import damage, write_snapshots
 
 R = 0.002
 
@@ -34,18 +36,20 @@ def folder(tmp_path: Path) -> Path:
     """Write a run of three snapshots: one grain moves from the box into the tube."""
     write_plan([Run("test", "one", {}, 1, tube_scene(), {})], tmp_path)
     folder = tmp_path / "runs" / "one"
-    (folder / "snapshots").mkdir()
-    for i, x in enumerate((0.02, 0.05, 0.06)):
+    made = [
         Snapshot(
             0.1 * i, 0.1 * i, "vibrate_1", np.array([1, 2]), np.array([1, 1]),
             np.array([[x, 0.02], [0.01, R]]), np.zeros((2, 2)), np.zeros((2, 3)), np.full(2, R),
-        ).save(folder / "snapshots" / f"{i:06d}.npz")  # fmt: skip
+        )
+        for i, x in enumerate((0.02, 0.05, 0.06))
+    ]  # fmt: skip
+    write_snapshots(folder, made)
     return folder
 
 
 def test_measures_have_a_row_a_snapshot_and_gaps_for_broken_ones(folder: Path) -> None:
-    broken = folder / "snapshots" / "000003.npz"
-    broken.write_bytes((folder / "snapshots" / "000000.npz").read_bytes()[:200])
+    write_snapshots(folder, [stored_snapshots(folder)[0].load()], after=3)
+    damage(folder, 3)
     write_measures(read_run(folder / "scenario.yaml").scenario, folder, folder / "measures.tsv")
     table = pd.read_csv(folder / "measures.tsv", sep="\t")
     bore = 0.02 * 0.03
@@ -55,7 +59,7 @@ def test_measures_have_a_row_a_snapshot_and_gaps_for_broken_ones(folder: Path) -
     of_bed = list(table.tube_fill_of_bed_fraction * table.solid_fraction)
     assert of_bed[:3] == pytest.approx(fill[:3])
     assert np.isnan(fill[3])
-    assert "000003.npz" in table.stage[3]
+    assert "000003" in table.stage[3]
 
 
 def test_exports_are_read_back_by_meshio_and_hold_the_moments(folder: Path) -> None:
@@ -83,8 +87,7 @@ def test_profile_sums_to_the_sand_in_the_box(folder: Path) -> None:
 
 
 def test_picture_of_a_run_without_snapshots_shows_the_scene(folder: Path) -> None:
-    for path in (folder / "snapshots").iterdir():
-        path.unlink()
+    (folder / "snapshots.npz").unlink()
     write_picture(read_run(folder / "scenario.yaml").scenario, folder, folder / "final.png")
     write_exports(read_run(folder / "scenario.yaml").scenario, folder, folder / "exports.zip")
     write_measures(read_run(folder / "scenario.yaml").scenario, folder, folder / "measures.tsv")

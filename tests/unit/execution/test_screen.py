@@ -19,7 +19,7 @@ from sandmould.execution.screen.run_watch import Ended, Running, RunWatch
 from sandmould.execution.screen.screen import Screen
 from sandmould.execution.screen.so_far import so_far_text
 from sandmould.execution.screen.table import counts_text, study_table
-from sandmould.execution.screen.view import RunView, StudyView
+from sandmould.execution.screen.view import StudyView
 from sandmould.kinds.sand.speed import SandSpeed
 from sandmould.runs import words
 from sandmould.runs.manifest import save_manifest
@@ -35,10 +35,9 @@ VIEW = StudyView(
     name="tube_demo",
     runs=42,
     done=12,
-    failed=1,
     running=(
-        RunView(Running("frequency_15_r6_b6a831", "vibrate_1", 40.0, 1.25, 2e7), 31.0),
-        RunView(Running("frequency_25_r1_01aa21"), 200.0),
+        (Running("frequency_15_r6_b6a831", "vibrate_1", 40.0, 1.25, 2e7), 31.0),
+        (Running("frequency_25_r1_01aa21"), 200.0),
     ),
     waiting=27,
     filling=0,
@@ -316,7 +315,7 @@ def test_cores_are_read_from_the_options(options: list[str], cores: int | None) 
 
 
 def test_fills_that_are_running_are_no_runs() -> None:
-    view = dataclasses.replace(VIEW, runs=16, done=0, failed=0, waiting=16, filling=2)
+    view = dataclasses.replace(VIEW, runs=16, done=0, failures=(), waiting=16, filling=2)
     assert counts_text(view) == "0 of 16 runs done, 16 waiting, 2 shared fills running"
     view = dataclasses.replace(view, waiting=15, filling=1)
     assert counts_text(view) == "0 of 16 runs done, 1 running, 15 waiting, 1 shared fill running"

@@ -9,6 +9,7 @@ import pandas as pd
 import pytest
 
 from sandmould.engines.snapshot import Snapshot
+from sandmould.engines.snapshot_file import stored_snapshots
 from sandmould.kinds.sand.measure import write_measures
 from sandmould.kinds.sand.moments import list_moments, nearest
 from sandmould.report.curves import time_chart
@@ -18,6 +19,7 @@ from sandmould.runs.columns import during_vibration
 from sandmould.statistics.over_time import passage_of
 from sandmould.statistics.verdict import compare_settings
 from sandmould.study.collect import gather
+from tests.snapshots import write_snapshots
 from tests.unit.report_study import DURATION_S, FILLING_S, KEY, PLANTED, scenario, write_study
 
 RUN = "f50_r1"
@@ -30,18 +32,22 @@ def study(tmp_path: Path) -> Path:
     """Every run ends with a rest of two snapshots, in which all sand leaves the tube."""
     folder = write_study(tmp_path / "tube", PLANTED, 3, ())
     for run in (folder / "runs").iterdir():
-        last = Snapshot.load(sorted((run / "snapshots").glob("*.npz"))[-1])
+        stored = stored_snapshots(run)
+        last, resting = stored[-1].load(), []
         for number in (1, 2):
             position = last.position_m.copy()
             position[position[:, 0] > 0.06, 0] -= 0.06
-            Snapshot(
-                **{
-                    **vars(last),
-                    "time_s": last.time_s + 0.5 * number * REST_S,
-                    "stage": "rest",
-                    "position_m": position,
-                }
-            ).save(run / "snapshots" / f"{100 + number:06d}.npz")
+            resting.append(
+                Snapshot(
+                    **{
+                        **vars(last),
+                        "time_s": last.time_s + 0.5 * number * REST_S,
+                        "stage": "rest",
+                        "position_m": position,
+                    }
+                )
+            )
+        write_snapshots(run, resting, after=len(stored))
         write_measures(scenario(float(run.name[1:].split("_")[0])), run, run / "measures.tsv")
     return folder
 

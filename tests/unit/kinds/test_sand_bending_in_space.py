@@ -20,6 +20,7 @@ from sandmould.pattern_fe.scene import pattern_of
 from sandmould.report.bending_figures import _lines_m, draw_outlines
 from sandmould.scenario.scenario import Scenario
 from tests.patterns import _one_thread  # noqa: F401
+from tests.snapshots import write_snapshots
 
 LOAD_N = -0.05
 
@@ -45,8 +46,7 @@ def bar_run(folder: Path) -> tuple[Scenario, Snapshot]:
         0.1, np.nan, "settle_1", one, one, place_m, none, none, np.array([0.002]),
         pattern_m=body.vertices_m + body.solve(load).displacement_m, pattern_load_n=load,
     )  # fmt: skip
-    (folder / "snapshots").mkdir()
-    snapshot.save(folder / "snapshots" / "000000.npz")
+    write_snapshots(folder, [snapshot])
     return scenario, snapshot
 
 

@@ -23,6 +23,7 @@ from sandmould.study.calibration.run import write_calibration
 from sandmould.study.collect import collect
 from sandmould.study.plan.plan_files import VERDICT_FILE, read_run
 from tests.planned import write_plan
+from tests.snapshots import write_snapshots
 
 FRICTION = "contact.grain_grain.friction"
 ARM = "contact.grain_grain.rolling_arm_fraction"
@@ -72,9 +73,7 @@ def write_planted(folder: Path, points: dict[tuple[float, float], float], extra:
     for run in runs:
         angle = points[run.parameters[FRICTION], run.parameters[ARM]] + 0.4 * (run.replicate - 1.5)
         place = folder / "runs" / run.run
-        (place / "snapshots").mkdir()
-        for number, sand in enumerate((heap(angle, 1.0), heap(angle, 2.0))):
-            sand.save(place / "snapshots" / f"{number:06d}.npz")
+        write_snapshots(place, [heap(angle, 1.0), heap(angle, 2.0)])
         header = "time_s\tvibration_time_s\tstage\tsurface\tforce_x_n\tforce_y_n\n"
         rows = "0.5\t-1\tsettle_1\tgate\t0\t-2.0\n0.5\t-1\tsettle_1\tleft\t-0.5\t0\n"
         (place / "loads.tsv").write_text(header + rows)

@@ -18,6 +18,7 @@ from sandmould.kinds.sand.loose import (
 from sandmould.report.loose_sand import loose_sand_pages
 from sandmould.scenario.sand import Sand
 from sandmould.scenario.scenario import Scenario
+from tests.snapshots import write_snapshots
 
 GRAIN_M = 0.001
 PLATE = {"kind": "plate", "name": "part", "centre_m": [0.007, 0.007, 0.009],
@@ -49,8 +50,7 @@ def folder(tmp_path: Path) -> Path:
     ids, none = np.arange(1, len(places) + 1), np.zeros((len(places), 3))
     radius = np.full(len(places), GRAIN_M / 2)
     still = Snapshot(0.1, np.nan, "settle_1", ids, np.ones_like(ids), places, none, none, radius)
-    (tmp_path / "runs" / "one" / "snapshots").mkdir(parents=True)
-    still.save(tmp_path / "runs" / "one" / "snapshots" / "000000.npz")
+    write_snapshots(tmp_path / "runs" / "one", [still])
     return tmp_path
 
 

@@ -20,6 +20,7 @@ from sandmould.report.page import LIMIT_BYTES, write_report
 from sandmould.report.sand import _layer_conclusion
 from sandmould.report.tables import Column, Table
 from sandmould.study.collect import collect
+from tests.snapshots import damage
 from tests.unit.report_study import (
     ENGINES,
     FAILED,
@@ -235,7 +236,7 @@ def test_finished_runs_without_the_measure_are_counted_as_finished(tmp_path: Pat
 
 def test_nothing_but_a_plan(tmp_path: Path) -> None:
     study = write_study(tmp_path / "plan")
-    for file in [*study.glob("runs/*/*.[jt]s*"), *study.glob("runs/*/snapshots/*")]:
+    for file in [*study.glob("runs/*/*.[jt]s*"), *study.glob("runs/*/snapshots.npz")]:
         file.unlink()
     text = report(study)
     assert "no outcome written" in text
@@ -245,7 +246,7 @@ def test_nothing_but_a_plan(tmp_path: Path) -> None:
 
 def test_broken_files_are_survived(tmp_path: Path) -> None:
     study = write_study(tmp_path / "broken")
-    (study / "runs" / "f50_r2" / "snapshots" / "000005.npz").write_bytes(b"PK\x03\x04 cut short")
+    damage(study / "runs" / "f50_r2", 5)
     (study / "runs" / "f25_r1" / "scenario.yaml").write_text("scenario: [")
     (study / "runs" / "f25_r2" / "products.json").write_text("{")
     (study / "runs" / "f25_r3" / "measures.tsv").write_text("time_s\n1\n")

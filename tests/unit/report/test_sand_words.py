@@ -10,8 +10,10 @@ import pytest
 
 from sandmould.engines.snapshot import Snapshot
 from sandmould.report.pictured_runs import pictured_runs
-from sandmould.report.sand import _density_conclusion, _role_text
+from sandmould.report.sand import _role_text
+from sandmould.runs.templates import worded
 from sandmould.statistics.verdict import Verdict, compare_settings
+from tests.snapshots import write_snapshots
 
 FILL = "tube_fill_fraction"
 ONE = np.ones(1)
@@ -46,8 +48,7 @@ def test_of_the_best_setting_the_run_in_the_middle_is_pictured(tmp_path: Path) -
          for run, (f_hz, fill) in fills.items()]
     )  # fmt: skip
     for run in fills:
-        (tmp_path / "runs" / run / "snapshots").mkdir(parents=True)
-        STILL.save(tmp_path / "runs" / run / "snapshots" / "000000.npz")
+        write_snapshots(tmp_path / "runs" / run, [STILL])
     verdict = compare_settings(table, ["f_hz"], FILL)
     assert pictured_runs(tmp_path, table, verdict) == {"best": "d", "worst": "b"}
     assert _role_text("best", verdict, table) == (
@@ -60,4 +61,4 @@ def test_of_the_best_setting_the_run_in_the_middle_is_pictured(tmp_path: Path) -
     [((1791.2, 1790.9), "stayed at 1\u202f791 kg"), ((1791.0, 1700.0), "fell from 1\u202f791 to")],
 )
 def test_a_density_that_shows_no_change_stayed(densities: tuple[float, float], said: str) -> None:
-    assert said in _density_conclusion(densities)
+    assert said in worded("density_course.j2", kg_m3=densities)

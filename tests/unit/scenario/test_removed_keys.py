@@ -9,7 +9,7 @@ import pytest
 import yaml
 
 from sandmould.bad_input import BadInputError
-from sandmould.scenario.moved_keys import REMOVED, holds_anyway, instead_of
+from sandmould.scenario.moved_keys import holds_anyway, instead_of, removed_keys
 from sandmould.study.plan.expand import expand
 from sandmould.study.plan.load_study import OpenStudy, open_study
 
@@ -76,7 +76,7 @@ def test_what_holds_anyway_is_dropped_and_anything_else_told(
     assert [run.run for run in expand(stated)] == [run.run for run in expand(plain)]
     line = refusal(tmp_path, based_on, path, other)
     assert line.startswith(f"trial.yaml: {path} = ")
-    assert line.endswith(f" cannot be used: valid is {REMOVED[path][1]}.")
+    assert line.endswith(f" cannot be used: valid is {removed_keys()[path][1]}.")
 
 
 def test_keys_in_lists_are_found_by_their_path_without_the_place(tmp_path: Path) -> None:
@@ -86,7 +86,7 @@ def test_keys_in_lists_are_found_by_their_path_without_the_place(tmp_path: Path)
     )
     line = refusal(tmp_path, "tube_3d_small", key, [TUBE | {"axis_y_m": 0.05}])
     assert line.startswith("trial.yaml: scenario.obstacles.0.axis_y_m = 0.05 cannot be used: valid")
-    assert REMOVED["scenario.obstacles.axis_y_m"][1] in line
+    assert removed_keys()["scenario.obstacles.axis_y_m"][1] in line
 
 
 def test_kinds_that_are_no_more_are_told(tmp_path: Path) -> None:
@@ -99,7 +99,7 @@ def test_a_removed_key_cannot_be_swept(tmp_path: Path) -> None:
     keys = {"discharge.settling.longest_s": [5, 9]}
     line = refusal(tmp_path, "repose_small", "sweep.keys", {"sand.size_scale": [1]} | keys)
     assert "sweep.keys.discharge.settling.longest_s = [5, 9]" in line
-    assert REMOVED["scenario.discharge.settling"][1] in line
+    assert removed_keys()["scenario.discharge.settling"][1] in line
 
 
 def test_a_part_of_a_section_holds_and_a_key_of_the_same_end_is_another() -> None:

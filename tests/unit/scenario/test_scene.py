@@ -66,11 +66,11 @@ def test_held_amplitude_stays_the_same_when_the_frequency_changes() -> None:
 def test_stage_lasts_whole_periods_and_ends_where_it_began() -> None:
     stage = VibrationStage(acceleration_g=1.5, frequency_hz=30, duration_s=1.01, ramp_s=0.1)
     assert stage.whole_duration_s == pytest.approx(1.0)
-    assert stage.displacement_at(0.0) == stage.displacement_at(1.0) == 0.0
+    assert stage.displacements_at(np.array(0.0)) == stage.displacements_at(np.array(1.0)) == 0.0
     quarter = 0.5 + 1 / 120
-    assert stage.displacement_at(quarter) == pytest.approx(stage.amplitude_m)
+    assert stage.displacements_at(np.array(quarter)) == pytest.approx(stage.amplitude_m)
     # Half way up the ramp, 1.5 periods in; a quarter period later it is a bit further.
-    assert stage.displacement_at(0.05 + 1 / 120) == pytest.approx(
+    assert stage.displacements_at(np.array(0.05 + 1 / 120)) == pytest.approx(
         -stage.amplitude_m * (0.5 + 1 / 12)
     )
 

@@ -10,13 +10,13 @@ import pytest
 import yaml
 
 from sandmould.definition.study import Objective
-from sandmould.execution.check import failed_runs
 from sandmould.kinds.sand.kind import SandStudy
 from sandmould.runs.outcome import Outcome, RunOutcome
 from sandmould.runs.run_tables import PLACE, read_tables
 from sandmould.study.collect import (
     NO_OUTCOME,
     collect,
+    failed_runs,
     gather,
     read_collected,
     read_provenance,
@@ -59,19 +59,6 @@ def test_curves_hold_every_snapshot_with_its_parameters(study: Path) -> None:
     assert list(curves.columns[:3]) == ["run", KEY, "replicate"]
     assert len(curves) == 8 * 12 + 4
     assert set(curves.loc[curves["run"] == "f25_r2", KEY]) == {25}
-
-
-def test_time_of_vibration_is_absent_before_it_also_in_older_tables(study: Path) -> None:
-    path = study / "runs" / "f25_r1" / "measures.tsv"
-    table = pd.read_csv(path, sep="\t")
-    before = table["vibration_time_s"].isna()
-    assert before.any()
-    table.fillna({"vibration_time_s": -1}).to_csv(path, sep="\t", index=False)
-    curves = gather(study).curves
-    for run in ("f25_r1", "f25_r2"):
-        shaken_s = curves.loc[curves["run"] == run, "vibration_time_s"]
-        assert shaken_s.isna().tolist() == before.tolist()
-        assert shaken_s.min() == 0.0
 
 
 def test_failed_run_has_gaps_and_says_why(study: Path) -> None:

@@ -14,13 +14,7 @@ import pandas as pd
 from sandmould.engines.registry import deck_reader, engine_module
 from sandmould.engines.session import EngineStop
 from sandmould.kinds.deck.own.columns import missing_columns
-from sandmould.kinds.deck.own.deck import (
-    OUTPUT,
-    RESTART_FILES,
-    check_unchanged,
-    names_used,
-    render,
-)
+from sandmould.kinds.deck.own.deck import OUTPUT, RESTART_FILES, check_unchanged, names_used, render
 from sandmould.kinds.deck.own.measures import measured, missing_dump
 from sandmould.kinds.deck.own.thermo import STEP, Thermo, read_thermo
 from sandmould.runs.outcome import Outcome, RunOutcome
@@ -43,10 +37,7 @@ def compute(scenario: OwnDeck, folder: Path, run: str, study: str) -> Computed:
     A restart file that cannot be gone on from is left for the one before it, and that for the
     beginning.
 
-    Parameters
-    ----------
-    folder : Path
-        The run's, with its deck where that is rendered; it runs in ``work/output``.
+    ``folder``: the run's, with its deck where that is rendered; it runs in ``work/output``.
 
     Raises
     ------
@@ -127,11 +118,6 @@ def _wrong_end(scenario: OwnDeck, thermo: Thermo, went_on: bool) -> str:
     if went_on:
         return f"{said}: after a restart write run {scenario.steps} upto"
     return f"{said}: state the steps that the deck runs, or none"
-
-
-def write_series(scenario: OwnDeck, work: Path) -> None:
-    """Write ``series.tsv``."""
-    series(scenario, work).to_csv(work / "series.tsv", sep="\t", index=False)
 
 
 def series(scenario: OwnDeck, work: Path) -> pd.DataFrame:

@@ -113,10 +113,7 @@ def names_used(scenario: OwnDeck) -> frozenset[str]:
 def render(scenario: OwnDeck, run: str, study: str, restart: str = "") -> str:
     """Render the deck of a run.
 
-    Parameters
-    ----------
-    restart : str
-        Restart file that the deck is to go on from; empty at the beginning.
+    ``restart``: restart file that the deck is to go on from; empty at the beginning.
 
     Raises
     ------

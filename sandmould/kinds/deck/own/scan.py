@@ -11,12 +11,7 @@ from collections.abc import Iterable, Iterator
 from dataclasses import dataclass
 from pathlib import Path
 
-from sandmould.kinds.deck.own.deck import (
-    RESTART_FILES,
-    names_used,
-    render,
-    template_text,
-)
+from sandmould.kinds.deck.own.deck import RESTART_FILES, names_used, render, template_text
 from sandmould.scenario.own_deck import OwnDeck
 
 LARGEST_BYTES = 1_000_000
@@ -71,10 +66,7 @@ class Finding:
 def to_read(scenarios: Iterable[OwnDeck]) -> list[str]:
     """List the lines to look at in templates, further files, and decks as they are rendered.
 
-    Parameters
-    ----------
-    scenarios : iterable of OwnDeck
-        One of each point of a study; all can be rendered.
+    ``scenarios``: one of each point of a study; all can be rendered.
 
     Returns
     -------
@@ -89,7 +81,8 @@ def to_read(scenarios: Iterable[OwnDeck]) -> list[str]:
                 seen.add(name)
                 found |= dict.fromkeys(_of_file(path, scenario.template == name))
         known = _known(template_text(scenario))
-        for restart in ("", f"../{RESTART_FILES[0]}") if _goes_on(scenario) else ("",):
+        goes_on = "restart" in names_used(scenario)
+        for restart in ("", f"../{RESTART_FILES[0]}") if goes_on else ("",):
             text = render(scenario, "run", "study", restart)
             rest = [
                 f for f in findings("the rendered deck", text) if not known.fullmatch(f.command)
@@ -106,10 +99,6 @@ def _known(template: str) -> re.Pattern[str]:
     fixed = [c for c in listed if _GIVEN not in c.split()[0]]
     ways = ["[^\n]*".join(map(re.escape, c.split(_GIVEN))) for c in fixed]
     return re.compile("|".join(ways) or r"(?!)")
-
-
-def _goes_on(scenario: OwnDeck) -> bool:
-    return "restart" in names_used(scenario)
 
 
 def _of_file(path: Path, is_template: bool) -> Iterator[str]:

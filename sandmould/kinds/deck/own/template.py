@@ -48,10 +48,7 @@ def names_in(template: str) -> frozenset[str]:
 def rendered(template: str, values: Mapping[str, Any]) -> str:
     """Render a template.
 
-    Parameters
-    ----------
-    values : mapping of str to any
-        What JSON can hold.
+    ``values``: what JSON can hold.
 
     Raises
     ------
