@@ -138,8 +138,8 @@ def failing_loops() -> Answer:
 
 def amplitude_swept() -> Answer:
     """A tube that fills better at the larger of two amplitudes, and not wholly."""
-    fills = dict(zip((0.00015, 0.0006), FILLS.values(), strict=True))
-    shares = {at: tuple(v + 0.06 for v in own) for at, own in fills.items()}
+    fills: Values = dict(zip((0.00015, 0.0006), FILLS.values(), strict=True))
+    shares: Values = {at: tuple(v + 0.06 for v in own) for at, own in fills.items()}
     drives = {"0.15 mm": BoxDrive(50.0, 1.5e-4), "0.6 mm": BoxDrive(50.0, 6e-4)}
     return answered(table(MM, **{FILL: fills, SHARE: shares}), FILL, [MM], drives=drives)
 
@@ -150,8 +150,48 @@ def too_wide() -> Answer:
     return answered(table(HZ, solid_fraction=fractions), "solid_fraction", [HZ])
 
 
+HEIGHTS = {0.1: (9.02, 8.99, 9.01), 0.3: (8.95, 8.93, 8.97), 0.5: (9.0, 8.96, 9.05),
+           0.8: (9.05, 8.88, 9.19)}  # fmt: skip
+"""Of a bed, mm."""
+
+
+def by_chance() -> Answer:
+    """The height of a bed over the friction, which changes it by no more than chance."""
+    return _height(HEIGHTS)
+
+
+def a_course() -> Answer:
+    """The same where little friction leaves a higher bed."""
+    return _height({0.05: (9.9, 9.95, 9.91), **HEIGHTS})
+
+
+def _height(heights_mm: Values) -> Answer:
+    heights: Values = {at: tuple(1e-3 * v for v in own) for at, own in heights_mm.items()}
+    return answered(
+        table("values.friction", bed_height_m=heights), "bed_height_m", ["values.friction"],
+        "neither",
+    )  # fmt: skip
+
+
+def none_is_shown_to_reach() -> Answer:
+    """A pocket and a hole that may be full at two settings of the table, at its limit."""
+    at = [(28.0, 0.0012), (40.0, 0.00062), (15.0, 0.0012)]
+    pocket = [(0.90, 0.93, 0.91), (0.92, 0.94, 0.90), (0.55, 0.6, 0.62)]
+    hole = [(0.74, 0.70, 0.78), (0.70, 0.66, 0.75), (0.40, 0.42, 0.38)]
+    rows = [
+        {"run": f"r{n}_{r}", HZ: hz, MM: mm, "replicate": r, "seed": r, "outcome_code": 0,
+         POCKET: pocket[n][r], HOLE: hole[n][r]}
+        for n, (hz, mm) in enumerate(at) for r in range(3)
+    ]  # fmt: skip
+    summary = pd.DataFrame(rows)
+    drives = {f"frequency {hz:g} Hz, amplitude {1e3 * mm:g} mm": BoxDrive(hz, mm) for hz, mm in at}
+    return answered(summary, POCKET, [HZ, MM], curves=over_a_second(summary, 0.14, POCKET, HOLE),
+                    drives=drives)  # fmt: skip
+
+
 QUESTIONS: Mapping[str, Callable[[], Answer]] = {
     each.__name__: each
     for each in (none_reaches, several_reach, best_at_an_end, two_cavities, one_value, no_chance,
-                 finest, no_effect, smaller_while_rising, failing_loops, amplitude_swept, too_wide)
+                 finest, no_effect, smaller_while_rising, failing_loops, amplitude_swept, too_wide,
+                 by_chance, a_course, none_is_shown_to_reach)
 }  # fmt: skip

@@ -26,6 +26,7 @@ from sandmould.runs.templates import Note, notes
 from sandmould.scenario.hardness import bed_hardness
 from sandmould.scenario.own_deck import OwnDeck
 from sandmould.scenario.scenario import Scenario
+from sandmould.wording.answer import OF_DRIVE
 
 _Ends = tuple[float, float]
 
@@ -41,6 +42,7 @@ def sand_method(scenario: Scenario, keys: Sequence[str], summary: pd.DataFrame) 
         it=bed_hardness(scenario),
         sizes_mm=[1e3 * each.diameter_m for each in scenario.sand.classes(scenario.dimension)],
         is_swept=any(key.startswith("vibration.") for key in keys),
+        is_held=not any(key.endswith(OF_DRIVE[1:]) for key in keys),
         steps=_steps(summary),
         bed=_steps_of_bed(summary),
         **_of_runs(keys, summary),

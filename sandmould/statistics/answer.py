@@ -5,6 +5,7 @@ Numbers and names only: ``sandmould.wording`` turns it into sentences.
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from enum import StrEnum
@@ -144,6 +145,29 @@ class Answer:
         """Labels of the settings that suit all that the runs should do well."""
         each = [a.wanted for a in (self, *self.beside) if a.wanted]
         return tuple(s for s in self.wanted if all(s in wanted for wanted in each))
+
+    @property
+    def may_reach(self) -> bool:
+        """Whether the interval of a mean that misses the target reaches to it."""
+        goal, known = self.asked.goal, self.shares.values()
+        return goal is not None and any(abs(goal.value - s.mean) <= s.ci_half_width for s in known)
+
+    @property
+    def runs_to_reach(self) -> int:
+        """Further runs of the best setting that would tell whether it reaches the target, or 0.
+
+        An interval shrinks with the root of the number of runs.
+        """
+        share = self.shares.get(self.best.label) if self.best else None
+        if share is None or self.asked.goal is None or not self.may_reach:
+            return 0
+        missing = abs(self.asked.goal.value - share.mean)
+        return max(0, math.ceil(share.n * ((share.ci_half_width / missing) ** 2 - 1.0)))
+
+    @property
+    def suits(self) -> bool:
+        """Whether what suits all suits it: where one does not reach its target, nothing does."""
+        return all(a.decided is not Decided.NONE_REACHES for a in (self, *self.beside))
 
     @property
     def trades(self) -> bool:

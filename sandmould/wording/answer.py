@@ -36,8 +36,6 @@ MOST_NAMED = 100
 NOTHING = 1e-3
 """Share of the largest value below which one is told as none."""
 _MOST_LABELS = 8
-_WIDEST = 0.5
-"""Half width of an interval of a share beyond which it says nothing."""
 OF_DRIVE = ("frequency_hz", "acceleration_g", "velocity_m_s", "displacement_m")
 """Ends of swept keys that the motion of the box states."""
 REASONS = {
@@ -72,7 +70,9 @@ def sand_limits(
 
     ``is_unchecked``: whether the best setting was looked for and its controls have not been run.
     """
-    hold = stage.hold if stage and any(k.endswith("frequency_hz") for k in keys) else ""
+    swept = {key.rpartition(".")[2] for key in keys}
+    is_held = "frequency_hz" in swept and not swept.intersection(OF_DRIVE[1:])
+    hold = stage.hold if stage and is_held else ""
     return sentences("sand_limits.j2", hold=hold, is_unchecked=is_unchecked)
 
 
@@ -94,12 +94,13 @@ def place_text(label: str, keys: Sequence[str], drive: BoxDrive | None, more: st
     said = {key.rpartition(".")[2] for key in keys}
     if drive is None or not said.intersection(OF_DRIVE):
         return f"{label} ({more})" if more else label
-    amplitude = f"±{1e3 * drive.displacement_m:.3g} mm"
+    amplitude = "" if "displacement_m" in said else f"±{1e3 * drive.displacement_m:.3g} mm"
     frequency = "" if "frequency_hz" in said else f" at {drive.frequency_hz:.3g} Hz"
     acceleration = "" if "acceleration_g" in said else f"{drive.acceleration_g:.2g} g"
     if said == {"displacement_m"}:
-        return f"{amplitude}{frequency} ({', '.join(filter(None, [acceleration, more]))})"
-    return f"{label} ({', '.join(filter(None, [amplitude + frequency, acceleration, more]))})"
+        label, frequency = f"±{1e3 * drive.displacement_m:.3g} mm{frequency}", ""
+    told = ", ".join(filter(None, [amplitude + frequency, acceleration, more]))
+    return f"{label} ({told})" if told else label
 
 
 @dataclass(frozen=True)
@@ -114,7 +115,7 @@ class Span:
     begins: tuple[str, str] = ("", "")
     last: tuple[str, str] = ("", "")
     steepest: tuple[str, str] = ("", "")
-    """Labels between which it changes most."""
+    """Labels between which it changes most, where that is more than chance."""
 
 
 @dataclass(frozen=True)
@@ -323,8 +324,9 @@ class AnswerWords:
         largest = max(abs(s.mean) for s in used)
 
         def told(s: Setting) -> tuple[str, str]:
-            is_none = abs(s.mean) < NOTHING * largest
-            return (f"about {self.value(0.0)}" if is_none else self.value(s.mean)), s.label
+            if abs(s.mean) < NOTHING * largest:
+                return f"about {self.value(0.0)}", s.label
+            return self.value(s.mean, s.ci_half_width), s.label
 
         low, high = (told(f(used, key=lambda s: s.mean)) for f in (min, max))
         if not self.is_scale or len(used) < 4:
@@ -335,12 +337,14 @@ class AnswerWords:
             return Span(low, high, used[first - 1].label, *at)
         pairs = itertools.pairwise(used)
         before, after = max(pairs, key=lambda pair: abs(pair[1].mean - pair[0].mean))
+        by_chance = before.ci_half_width + after.ci_half_width if self.asked.by_lot else 0.0
+        if not abs(after.mean - before.mean) > by_chance:
+            return Span(low, high)
         return Span(low, high, steepest=(before.label, after.label))
 
 
 def _shown(mean: float, half_width: float, digits: int, scale: float) -> str:
     """A value with its margin, unless that is wider than what the value can be."""
-    is_wide = math.isfinite(scale) and half_width > min(_WIDEST * scale, abs(mean))
-    if not math.isfinite(half_width) or is_wide:
+    if not math.isfinite(half_width) or half_width > scale:
         return number(mean, digits) if digits else f"{mean:.0f}"
     return with_margin(mean, half_width)

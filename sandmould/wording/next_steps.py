@@ -104,13 +104,18 @@ def _chance(study: Study, answer: Answer) -> Iterable[NextStep]:
     """More runs of each setting, where they would decide or tell chance at all."""
     if not answer.asked.by_lot or answer.decided is Decided.REACHED:
         return
-    fewest = min(s.n for s in answer.used)
-    if fewest < (2 if len(answer.used) > 1 and answer.asked.better != "neither" else FEW):
+    fewest, decided = min(s.n for s in answer.used), answer.decided
+    compares = len(answer.used) > 1 and answer.asked.better != "neither"
+    is_short = decided is Decided.NONE_REACHES and not answer.verdict.resolved
+    if fewest < (2 if compares and not is_short else FEW):
         runs = max(FEW, study.replicates + (fewest >= FEW))
         if runs > study.replicates:
             yield step("chance", f"replicates: {runs}", runs=runs)
         return
-    if answer.decided is not Decided.OPEN:
+    if is_short and 0 < answer.runs_to_reach <= WORTH:
+        runs = answer.runs_to_reach
+        yield step("reach", f"replicates: {study.replicates + runs}", runs=runs)
+    if decided is not Decided.OPEN:
         return
     settings, more = listed([s.label for s in answer.alike]), answer.further_runs
     if more is None or more > WORTH:

@@ -131,7 +131,7 @@ def test_a_map_has_its_table_its_picture_and_its_sands(mapped: Path) -> None:
     write_report(mapped, mapped / "report.html")
     text = (mapped / "report.html").read_text(encoding="utf-8")
     # Planted from 17 to 37 degrees.
-    assert re.search(r"The heap angle goes from 1[67]\.\d° .* to 3[67]\.\d° ", text)
+    assert re.search(r"The heap angle goes from 1[67]\.\d ± \d\.\d° .* to 3[67]\.\d° ", text)
     assert (mapped / VERDICT_FILE).read_text(encoding="utf-8") == (
         "sand_26 has friction 0.28 ± 0.12 and rolling arm 0.137 ± 0.058. Nothing on the map gives "
         "what was measured of sand_80.\n"
