@@ -37,6 +37,7 @@ from sandmould.runs.columns import (
 )
 from sandmould.runs.formatting import (
     OF_BED,
+    display_scale,
     filled_space,
     number,
     seconds,
@@ -161,15 +162,20 @@ def _total(summary: pd.DataFrame, column: str, how: str) -> float | None:
 
 
 def settings_table(verdict: Verdict, drives: Mapping[str, BoxDrive]) -> Table:
-    """Every setting with its mean, and the best against it.
+    """Every setting with its mean, lengths in mm, and the best against it where one is sought.
 
     ``drives``: that of the vibrating table at a setting, by label.
     """
     drive = ("amplitude, mm", "velocity, mm/s", "accel., g") if drives else ()
+    (factor, named), seeks_best = display_scale(verdict.measure), verdict.better != "neither"
+    of_best = (
+        *map(Column, ("best minus this", "95 % interval", "p")),
+        Column("beside the best", False),
+    )
     columns = (
         Column("setting", False),
-        *map(Column, ("mean ± 95 %", "best minus this", "95 % interval", "p")),
-        Column("beside the best", False),
+        Column(f"{named}, mean ± 95 %"),
+        *(of_best if seeks_best else ()),
         *map(Column, ("sd", "runs", *drive)),
     )
     rows, marked = [], []
@@ -179,25 +185,30 @@ def settings_table(verdict: Verdict, drives: Mapping[str, BoxDrive]) -> Table:
         interval, p, difference = "–", math.nan, math.nan
         standing = "best mean" if is_best else "no run"
         if against is not None:
-            difference, p = against.difference, against.p
+            difference, p = factor * against.difference, against.p
             standing = "not tested"
             if against.tested:
-                interval = f"{number(against.ci[0], 2)} to {number(against.ci[1], 2)}"
+                low, high = (number(factor * end, 2) for end in against.ci)
+                interval = f"{low} to {high}"
                 standing = "worse" if against.separated else "no clear difference"
+        beside_best = (
+            *_number_cells((difference, 2)),
+            Cell(interval, str(difference)),
+            Cell(_p_text(p), str(p)),
+            Cell(standing, standing),
+        )
+        mean, half_width = factor * setting.mean, factor * setting.ci_half_width
         rows.append(
             (
                 Cell(setting.label, str(place)),
-                Cell(with_margin(setting.mean, setting.ci_half_width), str(setting.mean)),
-                *_number_cells((difference, 2)),
-                Cell(interval, str(difference)),
-                Cell(_p_text(p), str(p)),
-                Cell(standing, standing),
-                *_number_cells((setting.sd, 2)),
+                Cell(with_margin(mean, half_width), str(setting.mean)),
+                *(beside_best if seeks_best else ()),
+                *_number_cells((factor * setting.sd, 2)),
                 Cell(f"{setting.n} of {setting.planned}", str(setting.n)),
                 *_drive_cells(drives.get(setting.label), bool(drives)),
             )
         )
-        marked.append(is_best)
+        marked.append(is_best and seeks_best)
     nearest = "the best and those that come nearest to it"
     note = listed_note(len(rows), len(verdict.settings), "settings", nearest)
     return Table(columns, tuple(rows), tuple(marked), note)
