@@ -15,12 +15,14 @@ _REFUSALS = (errno.ENOSPC, errno.EDQUOT, errno.EFBIG, errno.EROFS, errno.EIO, er
 _REFUSED = re.compile(
     rf"(?:(\S+): |\[Errno \d+\] )?({'|'.join(map(os.strerror, _REFUSALS))})(?:: '([^']+)')?"
 )
+_OF_JOB = re.compile(r"^JobError in file .*\n(.+)$(?s:.*?)^ *log: (\S+)", re.MULTILINE)
+"""What one of our jobs said, and its log."""
 _TRIAL_BYTES = 2**18
 LISTED_LINES = 6
 
 
 def trouble(folder: Path, log: Path) -> str:
-    """Say why a study stopped outside its runs: a file that was refused, else Snakemake's words."""
+    """Say why a study stopped: a file that was refused, a job of ours, else Snakemake's words."""
     text = log.read_text(encoding="utf-8", errors="replace") if log.exists() else ""
     refused = [(after or before, why) for before, why, after in _REFUSED.findall(text)]
     try:  # a full disk has no room for the log either
@@ -34,6 +36,9 @@ def trouble(folder: Path, log: Path) -> str:
             f"The study stopped, since {name} could not be written: {why}. What is computed stays: "
             "once that is mended, the same command goes on."
         )
+    if of_jobs := dict.fromkeys(_OF_JOB.findall(text)):
+        said = "\n".join(f"{Path(log).stem}: {why}. Its log: {log}" for why, log in of_jobs)
+        return f"Not computed, though tried again:\n{said}"
     words = [line.strip() for line in text.splitlines() if line.strip()]
     found = list(dict.fromkeys(line for line in words if _TROUBLE.search(line)))
     told = "; ".join(found[:LISTED_LINES] or words[-LISTED_LINES:])

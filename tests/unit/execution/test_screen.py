@@ -271,6 +271,25 @@ def test_the_last_line_is_the_verdict_and_the_report(tmp_path: Path) -> None:
     assert last_line(tmp_path) == f"15 Hz is best. The report: {page}"
 
 
+def test_a_job_that_did_not_end_says_why_and_names_its_log(tmp_path: Path) -> None:
+    log = tmp_path / "snakemake.log"
+    tried = """\
+RuleException:
+JobError in file "/here/workflow/rules/run.smk", line 82:
+was killed: the same command continues it
+  File "/here/workflow/rules/run.smk", line 82, in __rule_simulate
+[Sat Nov 28 16:33:13 2026]
+Error in rule simulate:
+    jobid: 2
+    log: results/chute/logs/simulate_r1.log (check log file(s) for error details)
+"""
+    log.write_text(tried + "Trying to restart job 2.\n" + tried)
+    assert trouble(tmp_path, log) == (
+        "Not computed, though tried again:\nsimulate_r1: was killed: the same command continues "
+        "it. Its log: results/chute/logs/simulate_r1.log"
+    )
+
+
 def test_trouble_is_told_once(tmp_path: Path) -> None:
     log = tmp_path / "snakemake.log"
     assert trouble(tmp_path, log) == ""
