@@ -409,9 +409,8 @@ def compare(
     from sandmould.report.comparison import read_comparison, write_comparison
     from sandmould.study.plan.build_plan import RESULTS
 
-    folders = [
-        Path(each) if Path(each).is_dir() else RESULTS / study_file(each).stem for each in studies
-    ]
+    found = {each: [f for f in (Path(each), RESULTS / each) if f.is_dir()] for each in studies}
+    folders = [(found[each] or [RESULTS / study_file(each).stem])[0] for each in studies]
     compared = read_comparison(folders)
     out = output or Path(
         "_".join([*(folder.resolve().name for folder in folders), "compared.html"])

@@ -56,7 +56,7 @@ class DeckPlanning(Planning[OwnDeck]):
     """See ``Planning``; only the deck knows what time it simulates."""
 
     slower = 3.0
-    guess = "by expected_core_s, an estimate"
+    guess = "by expected_core_s, an estimate that a pilot run replaces"
     speed = DeckSpeed()
     program = DeckProgram()
     measures = (
