@@ -71,8 +71,10 @@ class Feeding:
     """There, (K s)^0.5/m: where metal flows last it goes to nothing with smaller elements."""
 
 
-def feeding(fields: Mapping[str, Any]) -> Feeding:
-    """Read fields, the arrays of ``fields.npz``."""
+def feeding(fields: Mapping[str, Any]) -> Feeding | None:
+    """Read fields, the arrays of ``fields.npz``; None where an older version wrote them."""
+    if "flows_s" not in fields:
+        return None
     melts = fields["melts"]
     names = ("position_m", "size_m", "volume_m3", "flows_s", "riser", "niyama_sqrt_ks_m")
     place_m, size_m, volume_m3, flows_s, riser, niyama = (fields[name][melts] for name in names)

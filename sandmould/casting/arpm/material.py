@@ -141,8 +141,9 @@ class EnthalpyTable:
     """Where the enthalpy is 0."""
     rows: Floats
     """(m, 6) float64: J/m3/K; enthalpies of solidus and liquidus, J/m3; solidus and liquidus, K;
-    enthalpy at which gradients are read, J/m3. Where a material has curves all rows go on: enthalpy
-    at the first of the nodes, J/m3; nodes for a J/m3; temperature at each node, K."""
+    enthalpy at which gradients are read, J/m3. Where a material has curves all rows go on: number
+    of the node at no enthalpy, nodes for a J/m3; of the straight lines that begin at each node the
+    temperature at no enthalpy, K, and the slope, K m3/J."""
 
     def enthalpy_j_m3(self, temperature_k: Floats, material: Ints) -> Floats:
         """Enthalpy of elements; one on an isothermal front (solidus = liquidus) is liquid.
@@ -159,9 +160,10 @@ class EnthalpyTable:
         if self.rows.shape[1] > HEAD:
             found = np.empty(len(temperature_k))
             for m in np.unique(material):
-                own, (first, density) = material == m, self.rows[m, HEAD : HEAD + 2]
-                heat = first + np.arange(NODES) / density
-                found[own] = np.interp(temperature_k[own], self.rows[m, HEAD + 2 :], heat)
+                own, (shift, density) = material == m, self.rows[m, HEAD : HEAD + 2]
+                heat = (np.arange(NODES) - shift) / density
+                at_0_k, slope = self.rows[m, HEAD + 2 :].reshape(2, NODES)
+                found[own] = np.interp(temperature_k[own], at_0_k + slope * heat, heat)
             return found
         capacity, solid, liquid, solidus, liquidus = self.rows[material, :5].T
         below = capacity * (temperature_k - self.reference_k)
@@ -249,19 +251,21 @@ def _curves(it: ThermalMaterial, reference_k: float, hottest_k: float) -> Floats
     least = it.capacities_j_m3_k(place).min()
     nodes = np.linspace(heat[0], heat[-1], NODES)
     per_node = (NODES - 1) / (heat[-1] - heat[0])
-    head = [least, solidus, liquidus, it.solidus_k, it.liquidus_k, math.nan, heat[0], per_node]
-    return np.concatenate([head, np.interp(nodes, heat, place)])
+    node_k = np.interp(nodes, heat, place)
+    slope = np.diff(node_k, append=node_k[-1]) * per_node
+    slope[-1] = slope[-2]
+    head = [least, solidus, liquidus, it.solidus_k, it.liquidus_k, math.nan]
+    numbers = [-heat[0] * per_node, per_node]
+    return np.concatenate([head, numbers, node_k - slope * nodes, slope])
 
 
 @njit(inline="always")
 def temperature_of(enthalpy: float, m: int, rows: Any, reference: float) -> Any:
     """Temperature (K) of an enthalpy (J/m3) of material m; compiled code takes it in."""
     if rows.shape[1] > HEAD:
-        place = (enthalpy - rows[m, HEAD]) * rows[m, HEAD + 1]
         # whole numbers are bounded in less time
-        node = min(max(int(place), 0), NODES - 2)
-        low = rows[m, HEAD + 2 + node]
-        return low + (place - node) * (rows[m, HEAD + 3 + node] - low)
+        node = min(max(int(enthalpy * rows[m, HEAD + 1] + rows[m, HEAD]), 0), NODES - 2)
+        return rows[m, HEAD + 2 + node] + rows[m, HEAD + 2 + NODES + node] * enthalpy
     if enthalpy < rows[m, 1]:
         return reference + enthalpy / rows[m, 0]
     if enthalpy < rows[m, 2]:

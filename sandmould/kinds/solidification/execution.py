@@ -38,9 +38,9 @@ class SolidificationExecution(CastingExecution[Solidification]):
             for axis, place_m in zip("xyz", frozen.last_point_m, strict=False):
                 table[f"last_point_{axis}_m"] = place_m
             table["hot_spots"] = len(frozen.hot_spots_m)
-            fed = feeding(fields)
-            table["cut_off_fraction"] = fed.cut_off_fraction
-            table["low_niyama_fraction"] = fed.low_fraction
+            if fed := feeding(fields):
+                table["cut_off_fraction"] = fed.cut_off_fraction
+                table["low_niyama_fraction"] = fed.low_fraction
         write_measures(folder, table)
 
     def export(self, run: Run, folder: Path) -> None:

@@ -183,16 +183,16 @@ def _fields(
     frozen = freezing(place_m, fields["frozen_s"][melts], scenario.hot_spot_reach_m)
     fed = feeding(fields)
     distance_m = distance_from(solids_of(scenario))
-    reads = math.isfinite(fed.low_fraction)
+    reads = fed is not None and math.isfinite(fed.low_fraction)
     figure = Figure(figsize=(11, 9.2), dpi=110, layout=_ROOMY)
     (first_axes, end), (third, fourth) = figure.subplots(2, 2)
     draw_freezing(fields, frozen, first_axes, distance_m)
     draw_temperature(fields, frozen, end, distance_m)
-    draw_modulus(fields, frozen, third)
-    if reads:
-        draw_niyama(fields, frozen, fourth)
-    else:
-        fourth.set_axis_off()
+    for axes, draw, is_known in ((third, draw_modulus, fed), (fourth, draw_niyama, reads)):
+        if is_known:
+            draw(fields, frozen, axes)
+        else:
+            axes.set_axis_off()
     alone = Figure(figsize=(5.6, 4.6), dpi=110, layout=_ROOMY)
     draw_freezing(fields, frozen, alone.subplots(), distance_m)
     alt = f"When each part of the casting froze in run {folder.name}, with its outline"
@@ -205,13 +205,14 @@ def _fields(
         it=frozen,
         fed=fed,
         is_solid=math.isfinite(frozen.solidification_time_s),
-        in_riser=bool(fields["riser"][melts][last]),
+        in_riser=fed is not None and bool(fields["riser"][melts][last]),
         has_risers=bool(scenario.risers),
         reads=reads,
         limit=1e-3 * NIYAMA_LOW,
         flat=scenario.dimensions == 2,
     )
-    return png(figure), first, said, (_spots(frozen), _cut_off(fed, scenario.dimensions)), fed
+    tables = (_spots(frozen), *([_cut_off(fed, scenario.dimensions)] if fed else []))
+    return png(figure), first, said, tables, fed
 
 
 def _spots(frozen: Freezing) -> Table:
