@@ -60,10 +60,10 @@ class Casting:
         sites = self.sites(size_m)
         return sites[self.holds(sites)]
 
-    def mass_off(self, size_m: float) -> float:
-        """What the particles that fill it hold over what is drawn, less 1."""
-        drawn_m3 = math.pi / 8.0 * (self.lower_m**2 + self.upper_m**2) * self.height_m
-        return len(self.filled_m(size_m)) * size_m**3 / drawn_m3 - 1.0
+    @property
+    def volume_m3(self) -> float:
+        """As drawn."""
+        return math.pi / 8.0 * (self.lower_m**2 + self.upper_m**2) * self.height_m
 
     def level_m(self, size_m: float, particles: int) -> float:
         """Height that so many particles fill the mould to."""

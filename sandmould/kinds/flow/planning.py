@@ -112,7 +112,7 @@ class FlowPlanning(CastingPlanning[MetalFlow]):
             pours=pours,
             passes=pours and scenario.collision_distance == 0.0,
             beyond=beyond_map(scenario),
-            mass_percent=100.0 * PAPERS.mass_off(scenario.case.particle_m) if pours else 0.0,
+            mass_percent=scene.mass_percent(scenario),
         )
 
 

@@ -130,6 +130,7 @@ def _pages(findings: Findings[MetalFlow], film_budget_bytes: int) -> KindPages:
             most_off=MOST_OFF,
             beyond=[name_of(key) for key in beyond_map(scenario)],
             pours=not isinstance(scenario.case, StillTank),
+            mass_percent=scene.mass_percent(scenario),
             gradient=scene.scheme_of(scenario).gradient,
         ),
         steps=_steps(scenario, ranked),
