@@ -131,7 +131,8 @@ def neighbours(position_m: Array, size_m: Array) -> tuple[Ints, Ints]:
         along = np.moveaxis(owner, axis, 0)
         touch = np.stack([along[:-1].ravel(), along[1:].ravel()])
         pairs.append(touch[:, (touch >= 0).all(axis=0) & (touch[0] != touch[1])])
-    first, second = np.unique(np.concatenate(pairs, axis=1), axis=1)
+    touching, n = np.concatenate(pairs, axis=1), len(size_m)
+    first, second = np.divmod(np.unique(touching.min(axis=0) * n + touching.max(axis=0)), n)
     return first, second
 
 

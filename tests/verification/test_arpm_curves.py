@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping
+from copy import deepcopy
 from typing import Any
 
 import numpy as np
@@ -17,7 +18,7 @@ from sandmould.casting.arpm.filling import Filling
 from sandmould.casting.arpm.material import ThermalMaterial
 from sandmould.casting.arpm.method import HeatMethod
 from sandmould.casting.arpm.raster import Raster, painted
-from sandmould.casting.arpm.solidification import SolidificationResult, solidify
+from sandmould.casting.arpm.solidification import Cooling, SolidificationResult, solidify
 from sandmould.casting.arpm.varying import Transfer
 from sandmould.geometry.geometry import Block
 from sandmould.scenario.casting.curves import packed_over_gas, packed_w_m_k, solid_fractions
@@ -130,6 +131,25 @@ def test_a_plate_with_curves_freezes_as_finite_volumes_say(over_time: bool) -> N
         # 0.24 % where h follows temperature: conductances are found anew after a change of 5 K.
         assert found.solidification_time_s == pytest.approx(exact, rel=5e-3)
         assert np.abs(found.drift_percent).max() < 1e-9
+
+
+def test_a_run_with_curves_goes_on_bit_for_bit() -> None:
+    raster = slab((24, 8), (0, 1), 0.00125)
+    filling = Filling((DIE, ALLOY), (450.0, 960.0), 1 / 4000.0)
+    elements = placed(raster)
+    kept: list[dict[str, Any]] = []
+
+    def run(start: Cooling | None = None) -> SolidificationResult:
+        # conductances that were found anew records before are a state too
+        marching = HeatMethod("faces").marching(elements, filling, raster)
+        return solidify(elements, filling, marching, None, 0.1, 30.0, None, start,
+                        lambda now: kept.append(deepcopy(now.arrays())))  # fmt: skip
+
+    straight = run()
+    middle = {name: np.asarray(value) for name, value in kept[len(kept) // 2].items()}
+    again = run(Cooling.of(middle))
+    np.testing.assert_array_equal(again.heat.temperature_k, straight.heat.temperature_k)
+    np.testing.assert_array_equal(again.heat.noted, straight.heat.noted)
 
 
 def test_faces_of_two_sizes_follow_curves_too() -> None:

@@ -133,7 +133,7 @@ def _write(
     work: Path,
 ) -> None:
     """Write the curves and the fields at the end."""
-    melts, volume, noted = filling.melts(elements), elements.volume_m3, result.heat.noted
+    melts, volume = filling.melts(elements), elements.volume_m3
     frozen_s = middle_frozen_s(elements, filling, result.heat.frozen_s)
     whole = volume[melts].sum()
     solid = [float(volume[melts & (frozen_s <= t)].sum() / whole) for t in result.time_s]
@@ -141,14 +141,18 @@ def _write(
     probes = {f"{name}_k": curve for name, curve in result.probe_k.items()}
     table = pd.DataFrame({clock: result.time_s, **probes, share: solid, heat: result.enthalpy_j})
     table.to_csv(work / "series.tsv", sep="\t", index=False, float_format="%.10g")
+    read_j_m3 = filling.table.rows[elements.material, 5]
+    # what has melted again flows; what was poured so cold never did
+    noted = np.where(result.heat.enthalpy_j_m3 < read_j_m3, result.heat.noted, np.nan)
+    flows_s = np.where(result.heat.enthalpy_j_m3 < read_j_m3, np.nan_to_num(noted[1]), np.nan)
+    flows_s = np.where(np.isfinite(read_j_m3), flows_s, frozen_s)
     steep_k_m = gradient_k_m(elements, noted)
     np.savez_compressed(
         work / "fields.npz", position_m=elements.position_m, size_m=elements.size_m,
         volume_m3=volume, melts=melts, frozen_s=frozen_s, temperature_k=result.heat.temperature_k,
         riser=scene.risers_of(scenario, elements) & melts,
         modulus_m=plate_modulus_m(scenario, frozen_s),
-        flows_s=np.where(np.isfinite(filling.table.rows[elements.material, 5]), noted[1], frozen_s),
-        cooling_k_s=noted[2], gradient_k_m=steep_k_m,
+        flows_s=flows_s, cooling_k_s=noted[2], gradient_k_m=steep_k_m,
         niyama_sqrt_ks_m=steep_k_m / np.sqrt(noted[2]),
     )  # fmt: skip
 

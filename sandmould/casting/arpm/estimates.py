@@ -195,9 +195,10 @@ def freezes_s(scenario: Solidification, it: Cooled, depth_m: float = math.inf) -
 def plate_modulus_m(scenario: Solidification, frozen_s: Floats) -> Floats:
     """Modulus of the plate that freezes in the same time as each element, (n,) float64, m.
 
-    Its half thickness, in this mould without end and behind this surface.
+    Its half thickness, in this mould without end and behind this surface; NaN of metal that is
+    poured at its solidus, which no plate keeps.
     """
-    known = np.isfinite(frozen_s)
+    known = np.isfinite(frozen_s) & (heat_to_lose_j_m3(scenario) > 0.0)
     last_s = float(frozen_s[known].max(initial=1e-6))
     modulus_m, times_s = [1e-6], [0.0]
     while times_s[-1] < last_s:

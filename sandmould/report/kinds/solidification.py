@@ -188,7 +188,8 @@ def _fields(
     (first_axes, end), (third, fourth) = figure.subplots(2, 2)
     draw_freezing(fields, frozen, first_axes, distance_m)
     draw_temperature(fields, frozen, end, distance_m)
-    for axes, draw, is_known in ((third, draw_modulus, fed), (fourth, draw_niyama, reads)):
+    has_modulus = fed is not None and bool(np.isfinite(fields["modulus_m"]).any())
+    for axes, draw, is_known in ((third, draw_modulus, has_modulus), (fourth, draw_niyama, reads)):
         if is_known:
             draw(fields, frozen, axes)
         else:
