@@ -15,7 +15,17 @@ from sandmould.geometry.outline import Outline
 from sandmould.geometry.revolved import Revolved
 from sandmould.runs.files import replaced
 
-_OF_ELEMENTS = ("frozen_s", "temperature_k", "melts")
+_OF_ELEMENTS = (
+    "frozen_s",
+    "temperature_k",
+    "melts",
+    "riser",
+    "modulus_m",
+    "flows_s",
+    "cooling_k_s",
+    "gradient_k_m",
+    "niyama_sqrt_ks_m",
+)
 _COLUMNS = "id type x y z vx vy vz omegax omegay omegaz radius layer"
 
 

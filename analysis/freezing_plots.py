@@ -8,6 +8,7 @@ import numpy as np
 from matplotlib.axes import Axes
 from numpy.typing import NDArray
 
+from sandmould.analysis.feeding import NIYAMA_LOW, owner_grid
 from sandmould.analysis.freezing import Freezing
 
 Array = NDArray[np.float64]
@@ -35,10 +36,7 @@ def draw_freezing(
     _draw(cut, axis, values, axes, "frozen at, s", "viridis")
     if distance_m is not None:
         _draw_outline(cut, axis, at_m, axes, distance_m)
-    beside_mm = 1e3 * (cut["position_m"][melts].min(axis=0) - 3.0 * cut["size_m"].max())
-    beyond_mm = 1e3 * (cut["position_m"][melts].max(axis=0) + 3.0 * cut["size_m"].max())
-    axes.set_xlim(beside_mm[0], beyond_mm[0])
-    axes.set_ylim(beside_mm[1], beyond_mm[1])
+    _frame_casting(cut, axes)
     spots_mm = 1e3 * _flat(freezing.hot_spots_m[:MOST_SPOTS], axis)
     axes.plot(*spots_mm.T, "o", mfc="none", mec=_INK, ms=9, mew=1.5, label="hot spot")
     if np.isfinite(freezing.last_point_m).all():
@@ -51,7 +49,7 @@ def draw_freezing(
             mew=2,
             label=at,
         )
-    axes.legend(fontsize=8, loc="upper right")
+    axes.legend(fontsize=8, loc="lower center", bbox_to_anchor=(0.5, 1.0), ncols=2, frameon=False)
 
 
 def draw_temperature(
@@ -65,6 +63,30 @@ def draw_temperature(
     _draw(cut, axis, cut["temperature_k"], axes, "temperature at the end, K", "inferno")
     if distance_m is not None:
         _draw_outline(cut, axis, at_m, axes, distance_m)
+
+
+def draw_niyama(fields: Mapping[str, Array], freezing: Freezing, axes: Axes) -> None:
+    """Draw Niyama's value over the casting, as ``draw_freezing``; twice its limit is the most."""
+    cut, axis, _ = _cut(fields, freezing)
+    niyama = 1e-3 * cut["niyama_sqrt_ks_m"]
+    most = 2e-3 * NIYAMA_LOW
+    _draw(cut, axis, niyama, axes, "Niyama, (K s)$^{1/2}$/mm", "RdYlBu", (0.0, most))
+    _frame_casting(cut, axes)
+
+
+def draw_modulus(fields: Mapping[str, Array], freezing: Freezing, axes: Axes) -> None:
+    """Draw the modulus over the casting, as ``draw_freezing``."""
+    cut, axis, _ = _cut(fields, freezing)
+    _draw(cut, axis, 1e3 * cut["modulus_m"], axes, "modulus by freezing time, mm", "cividis")
+    _frame_casting(cut, axes)
+
+
+def _frame_casting(cut: Mapping[str, Array], axes: Axes) -> None:
+    """Show the casting alone, with a rim."""
+    casting_m, rim_m = cut["position_m"][cut["melts"].astype(bool)], 3.0 * cut["size_m"].max()
+    low_mm, high_mm = 1e3 * (casting_m.min(axis=0) - rim_m), 1e3 * (casting_m.max(axis=0) + rim_m)
+    axes.set_xlim(low_mm[0], high_mm[0])
+    axes.set_ylim(low_mm[1], high_mm[1])
 
 
 def _draw_outline(
@@ -137,13 +159,19 @@ def _flat(place_m: Array, axis: int) -> Array:
 
 
 def _draw(
-    fields: Mapping[str, Array], axis: int, values: Array, axes: Axes, title: str, colours: str
+    fields: Mapping[str, Array],
+    axis: int,
+    values: Array,
+    axes: Axes,
+    title: str,
+    colours: str,
+    limits: tuple[float, float] | None = None,
 ) -> None:
     grid, low_m, high_m = _grid(fields["position_m"], fields["size_m"], values)
     (left, below), (right, above) = (1e3 * low_m).tolist(), (1e3 * high_m).tolist()
     image = axes.imshow(
         grid.T, origin="lower", extent=(left, right, below, above), cmap=colours,
-        interpolation="nearest",
+        interpolation="nearest", clim=limits,
     )  # fmt: skip
     figure = axes.figure
     figure.colorbar(image, ax=axes, label=title, shrink=0.85)
@@ -158,15 +186,6 @@ def _name_axes(axes: Axes, axis: int) -> None:
 
 def _grid(position_m: Array, size_m: Array, values: Array) -> tuple[Array, Array, Array]:
     """Values on cells of the smallest size, larger elements over several of them."""
-    cell_m = float(size_m.min())
-    low_m = (position_m - 0.5 * size_m[:, None]).min(axis=0)
-    high_m = (position_m + 0.5 * size_m[:, None]).max(axis=0)
-    grid = np.full(np.round((high_m - low_m) / cell_m).astype(int), np.nan)
-    corner = np.round((position_m - 0.5 * size_m[:, None] - low_m) / cell_m).astype(int)
-    span = np.round(size_m / cell_m).astype(int)
-    for cells in np.unique(span):
-        own = span == cells
-        for i in range(cells):
-            for j in range(cells):
-                grid[corner[own, 0] + i, corner[own, 1] + j] = values[own]
-    return grid, low_m, high_m
+    owner, low_m = owner_grid(position_m, size_m)
+    grid = np.where(owner >= 0, values[owner], np.nan)
+    return grid, low_m, low_m + float(size_m.min()) * np.array(owner.shape)

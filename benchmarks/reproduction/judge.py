@@ -9,23 +9,19 @@ from benchmarks.reproduction.ledger import LedgerRow, Theirs
 from benchmarks.reproduction.our_number import OurNumber
 from sandmould.runs.formatting import number, with_margin
 
-AGREES, DIFFERS, UNRESOLVED = "agrees", "differs", "not resolved"
-POSSIBLE = "not ruled out"
-NO_INTERVAL = "no interval"
-TAKEN = "taken over"
+AGREES, HOLDS, DIFFERS, UNRESOLVED = "agrees", "holds", "differs", "not resolved"
+BETTER, WORSE, POSSIBLE, NO_INTERVAL = "better", "worse", "not ruled out", "no interval"
 NOT_COMPUTED, NOT_COMPARED = "not computed", "not compared"
-PICTURE = "picture"
-WORDS = "in words"
-TESTED = "tested"
-DEFINED = "defined"
-MEASURED = "their measurement"
+PICTURE, WORDS, TESTED, DEFINED = "picture", "in words", "tested", "defined"
+TAKEN, MEASURED = "taken over", "their measurement"
 STATES = {
-    AGREES: "ours meets their number, range or bound: with several fillings our whole 95 % "
-    "interval lies in theirs, or holds their number",
+    AGREES: "ours meets their number or range: with several fillings our whole 95 % interval",
+    HOLDS: "theirs is a bound or a sign and ours lies on that side, which says less",
     DIFFERS: "it does not",
+    BETTER: "they tell a fault, and ours has less of it",
+    WORSE: "they tell a fault, and ours has as much of it, or more",
     UNRESOLVED: "our interval reaches over an end of their range",
-    POSSIBLE: "theirs lies on the top of our best: between the nearest settings on either side "
-    "that are ruled out, or the ends of the sweep",
+    POSSIBLE: "theirs lies on the top of our best, between settings that are ruled out",
     NO_INTERVAL: "two numbers without a spread: the difference stands, no verdict",
     TAKEN: "a number that is put in, the same in our study",
     PICTURE: "theirs is in a picture and not in the text, so that nothing can be compared",
@@ -64,14 +60,17 @@ def state_of(row: LedgerRow, ours: OurNumber | None) -> str:
         return TAKEN if math.isclose(ours.best, theirs[0], rel_tol=_CLOSE) else DIFFERS
     if theirs[0] == theirs[1]:
         if ours.low == ours.high:
-            is_equal = math.isclose(ours.best, theirs[0], rel_tol=_CLOSE)
-            return AGREES if is_equal else NO_INTERVAL
+            return AGREES if difference_text(row.theirs, ours) == "0" else NO_INTERVAL
         if not ours.low <= theirs[0] <= ours.high:
             return DIFFERS
         return POSSIBLE if row.ours[0].take == "best" else AGREES
     if theirs[0] <= ours.low and ours.high <= theirs[1]:
-        return AGREES
-    return DIFFERS if ours.low > theirs[1] or ours.high < theirs[0] else UNRESOLVED
+        if row.theirs.fault:
+            return WORSE
+        return HOLDS if math.isinf(theirs[0]) or math.isinf(theirs[1]) else AGREES
+    if ours.low <= theirs[1] and ours.high >= theirs[0]:
+        return UNRESOLVED
+    return BETTER if row.theirs.fault else DIFFERS
 
 
 def difference_text(theirs: Theirs, ours: OurNumber | None) -> str:

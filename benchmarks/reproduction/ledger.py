@@ -24,6 +24,7 @@ class Theirs(Section):
     high: float | None = Field(None, description="Most of a range, or what it lies below.")
     unit: str = Field("", description="Of the numbers.")
     says: str = Field("", description="What the text says, in our words.")
+    fault: bool = Field(False, description="Whether low or high is told as a fault of theirs.")
     picture: bool = Field(False, description="Whether the answer is in a picture alone.")
 
     @model_validator(mode="after")

@@ -20,7 +20,8 @@ LAST_MEASURED = "measures.tsv"
 """File of a run's folder that is written after all else that is measured."""
 PICTURE = "final.png"
 """What an export of a run draws."""
-EXPORTED = (PICTURE, "exports.zip", "fields.vtu")
+CURVES = "cooling_curves.csv"
+EXPORTED = (PICTURE, "exports.zip", "fields.vtu", CURVES)
 """Files of a run's folder that are made when asked for, see ``Execution.export``."""
 
 

@@ -28,7 +28,8 @@ SHARE = "source_share"
 MOST_ACROSS = 4
 """Panels in a row."""
 SIGNS = {
-    StabilityRating.EXCELLENT: ("o", "#009E73"), StabilityRating.GOOD: ("D", "#E69F00"),
+    StabilityRating.EXCELLENT: ("o", "#009E73"), StabilityRating.BIASED: ("s", "#56B4E9"),
+    StabilityRating.GOOD: ("D", "#E69F00"),
     StabilityRating.FAILED: ("x", "#D55E00"),
 }  # fmt: skip
 """The paper's signs, and colours that anyone can tell apart."""
@@ -81,7 +82,7 @@ def stability_map(summary: pd.DataFrame, keys: Sequence[str]) -> str:
                mfc="none" if verdict is not StabilityRating.GOOD else colour)
         for verdict, (marker, colour) in SIGNS.items()
     ]  # fmt: skip
-    figure.legend(handles=signs, loc="outside lower center", ncols=3, frameon=False)
+    figure.legend(handles=signs, loc="outside lower center", ncols=4, frameon=False)
     return png(figure)
 
 

@@ -246,6 +246,7 @@ def _render(
         multiples=small_multiples,
         half_sizes=lambda chart: (lay_out(chart, SMALL), lay_out(chart, NARROW)),
         advice=[] if optimum else _beside_mode(page, mode),
+        found=of_kind.findings,
         warning=of_kind.warning,
         picture=of_kind.picture,
         reported_best=page.study.objective.reported_best,

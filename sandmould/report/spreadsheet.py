@@ -17,12 +17,13 @@ from sandmould.report.curves import runs_of
 from sandmould.runs.files import replaced
 from sandmould.runs.formatting import distinct_names, is_number, unit_of
 from sandmould.scenario.drive import ACCELERATION, DISPLACEMENT, VELOCITY
+from sandmould.scenario.units import ZERO_K
 from sandmould.statistics.verdict import compare_settings
 from sandmould.study.collect import read_collected, read_study
 
 _SHOWN = {
     "m": ("mm", 1e3, 0.0), "m/s": ("mm/s", 1e3, 0.0), "m²": ("mm²", 1e6, 0.0),
-    "m³": ("mm³", 1e9, 0.0), "K": ("°C", 1.0, -273.15),
+    "m³": ("mm³", 1e9, 0.0), "K": ("°C", 1.0, -ZERO_K),
 }  # fmt: skip
 """The unit shown, factor and offset, of a unit of the tables; others stay as they are."""
 _WIDEST = 40

@@ -27,7 +27,7 @@ CELSIUS = "degC"
 """Taken where a key states kelvin."""
 OVER_CELSIUS = f" over {CELSIUS}"
 """After the unit of a curve's values where its temperatures are in degrees C."""
-_ZERO_K = 273.15
+ZERO_K = 273.15
 _DEGREES = ("C", "degC", "deg C", "°C", "celsius")
 _NUMBER = re.compile(r"\s*([-+]?(?:\d+[.,]?\d*|[.,]\d+)(?:[eE][-+]?\d+)?)\s*(\S.*?)\s*$")
 _SPELT = str.maketrans({"µ": "u", "μ": "u", "²": "2", "³": "3", "^": None, "*": None, "·": " "})
@@ -64,7 +64,7 @@ def unit_of(unit: str) -> str:
 def in_kelvin(value: Any, unit: str) -> Any:
     """A value as it counts: degrees C as kelvin, in a number or in the pairs of a curve."""
     if unit.endswith(OVER_CELSIUS):
-        return [[round(place + _ZERO_K, 9), of] for place, of in value]
+        return [[round(place + ZERO_K, 9), of] for place, of in value]
     if unit == CELSIUS and isinstance(value, int | float):
-        return round(value + _ZERO_K, 9)
+        return round(value + ZERO_K, 9)
     return value

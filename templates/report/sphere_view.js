@@ -265,12 +265,13 @@ function sphereView(canvas, scene) {
     paint(box.lines, gl.LINES, [0.35, 0.37, 0.39, 1], { whole: true });
     for (const part of standing) paint(part.lines, gl.LINES, [0.2, 0.22, 0.25, 1], { nearer: 1e-4 });
     if (showsSolids) for (const bore of bores) paint(bore.lines, gl.LINES, [0.04, 0.36, 0.68, 1], { nearer: 1e-4 });
-    for (const mark of marks) paint(mark.lines, gl.LINES, [0.7, 0.15, 0.12, 1], { whole: true });
     gl.enable(gl.BLEND);
     gl.blendFunc(gl.SRC_ALPHA, gl.ONE_MINUS_SRC_ALPHA);
     gl.depthMask(false);
     paintThrough(box.faces, [0.75, 0.78, 0.8, 0.25], [gl.FRONT]);
     for (const part of standing.filter((p) => !p.painted[painted])) paintThrough(part.faces, scene.solid_tint, [gl.FRONT, gl.BACK]);
+    gl.disable(gl.DEPTH_TEST); // marks are seen through all else
+    for (const mark of marks) paint(mark.lines, gl.LINES, [0.7, 0.15, 0.12, 1], { whole: true });
     gl.bindVertexArray(null);
   }
 

@@ -34,11 +34,12 @@ def test_a_tiny_tank_stands_through_the_workflow(tmp_path: Path) -> None:
     study = tmp_path / "results" / "still"
     summary = pd.read_csv(study / "summary.tsv", sep="\t")
     assert summary["outcome"].tolist() == ["finished"] * 2
-    assert summary["classification"].tolist() == ["excellent"] * 2
+    # calm, but so few particles deep the mean is off by more than 2 %
+    assert summary["classification"].tolist() == ["biased"] * 2
     for run in summary["run"]:
         folder = study / "runs" / str(run)
         left = {path.name for path in folder.iterdir()}
         assert {"series.tsv", "fields.npz", "measures.tsv", "products.json", "deck.in"} <= left
     page = (study / "report.html").read_text()
-    assert "2 excellent, 0 good and 0 failed" in page
+    assert "0 excellent, 2 biased, 0 good and 0 failed" in page
     assert "Pressure noise" in page

@@ -14,9 +14,9 @@ import pandas as pd
 from sandmould.casting.arpm import scene, source_hash
 from sandmould.casting.arpm import source_files as source_files
 from sandmould.casting.arpm.elements import Elements, placed
-from sandmould.casting.arpm.estimates import least_sand_share
+from sandmould.casting.arpm.estimates import least_sand_share, plate_modulus_m
 from sandmould.casting.arpm.filling import Filling
-from sandmould.casting.arpm.front import middle_frozen_s
+from sandmould.casting.arpm.front import gradient_k_m, middle_frozen_s
 from sandmould.casting.arpm.marching import STEP_SHARE
 from sandmould.casting.arpm.solidification import (
     Cooling,
@@ -141,9 +141,19 @@ def _write(
     probes = {f"{name}_k": curve for name, curve in result.probe_k.items()}
     table = pd.DataFrame({clock: result.time_s, **probes, share: solid, heat: result.enthalpy_j})
     table.to_csv(work / "series.tsv", sep="\t", index=False, float_format="%.10g")
+    read_j_m3 = filling.table.rows[elements.material, 5]
+    # what has melted again flows; what was poured so cold never did
+    noted = np.where(result.heat.enthalpy_j_m3 < read_j_m3, result.heat.noted, np.nan)
+    flows_s = np.where(result.heat.enthalpy_j_m3 < read_j_m3, np.nan_to_num(noted[1]), np.nan)
+    flows_s = np.where(np.isfinite(read_j_m3), flows_s, frozen_s)
+    steep_k_m = gradient_k_m(elements, noted)
     np.savez_compressed(
         work / "fields.npz", position_m=elements.position_m, size_m=elements.size_m,
         volume_m3=volume, melts=melts, frozen_s=frozen_s, temperature_k=result.heat.temperature_k,
+        riser=scene.risers_of(scenario, elements) & melts,
+        modulus_m=plate_modulus_m(scenario, frozen_s),
+        flows_s=flows_s, cooling_k_s=noted[2], gradient_k_m=steep_k_m,
+        niyama_sqrt_ks_m=steep_k_m / np.sqrt(noted[2]),
     )  # fmt: skip
 
 

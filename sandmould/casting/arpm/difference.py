@@ -16,7 +16,7 @@ from scipy.sparse import coo_array, csr_array
 
 from sandmould.arrays import Floats
 from sandmould.casting.arpm.exchange import resistances
-from sandmould.casting.arpm.marching import STEP_SHARE, Heat
+from sandmould.casting.arpm.marching import STEP_SHARE, Heat, note
 from sandmould.casting.arpm.material import EnthalpyTable, temperature_of
 from sandmould.casting.arpm.raster import BesideFaces, Raster
 from sandmould.compiled import njit
@@ -96,7 +96,7 @@ class DifferenceSteps:
         shape = self._grid.material.shape
         heat.temperature_k = _difference_steps(
             steps, duration_s / steps, heat.time_s, self._grid, heat.enthalpy_j_m3.reshape(shape),
-            heat.temperature_k.reshape(shape), heat.frozen_s.reshape(shape),
+            heat.temperature_k.reshape(shape), heat.noted,
         ).reshape(-1)  # fmt: skip
         heat.time_s += duration_s
         heat.element_steps += steps * self._grid.material.size
@@ -140,9 +140,9 @@ def _links(raster: Raster, passage: BesideFaces, conductivity: Floats) -> csr_ar
 @njit(parallel=True)
 def _difference_steps(
     steps: int, dt: float, time_s: float, grid: HeatGrid, enthalpy: Any, temperature: Any,
-    frozen: Any,
+    noted: Any,
 ) -> Any:  # fmt: skip
-    """Take explicit steps; enthalpy and freezing times change in place, temperatures come back."""
+    """Take explicit steps; enthalpy and notes change in place, temperatures come back."""
     through_x, through_y, through_z, material, thinner, start, cell, along, rows, reference = grid
     nx, ny, nz = enthalpy.shape
     now, then = temperature.copy(), np.empty_like(temperature)
@@ -172,10 +172,8 @@ def _difference_steps(
                 after = before + dt * taken
                 enthalpy[x, y, z] = after
                 then[x, y, z] = temperature_of(after, m, rows, reference)
-                if before >= rows[m, 1] > after:
-                    share = (before - rows[m, 1]) / (before - after)
-                    frozen[x, y, z] = time_s + (step + share) * dt
-                elif after >= rows[m, 1] > before:
-                    frozen[x, y, z] = np.nan
+                note(
+                    line * nz + z, m, before, after, time_s + step * dt, dt, rows, reference, noted
+                )
         now, then = then, now
     return now

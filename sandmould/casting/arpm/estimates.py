@@ -192,6 +192,22 @@ def freezes_s(scenario: Solidification, it: Cooled, depth_m: float = math.inf) -
     return high_s
 
 
+def plate_modulus_m(scenario: Solidification, frozen_s: Floats) -> Floats:
+    """Modulus of the plate that freezes in the same time as each element, (n,) float64, m.
+
+    Its half thickness, in this mould without end and behind this surface; NaN of metal that is
+    poured at its solidus, which no plate keeps.
+    """
+    known = np.isfinite(frozen_s) & (heat_to_lose_j_m3(scenario) > 0.0)
+    last_s = float(frozen_s[known].max(initial=1e-6))
+    modulus_m, times_s = [1e-6], [0.0]
+    while times_s[-1] < last_s:
+        half_m = 1.2 * modulus_m[-1]
+        modulus_m.append(half_m)
+        times_s.append(freezes_s(scenario, Cooled(half_m, half_m, half_m, 1.0, math.inf)))
+    return np.where(known, np.interp(frozen_s, times_s, modulus_m), np.nan)
+
+
 def _lacks_j_m2(scenario: Solidification, it: Cooled, depth_m: float, time_s: float) -> float:
     """Heat that the casting has still to lose through its surface before its middle is solid.
 

@@ -13,7 +13,7 @@ from sandmould.arrays import Flags, Floats
 from sandmould.casting.arpm.elements import Elements
 from sandmould.casting.arpm.exchange import resistances
 from sandmould.casting.arpm.marching import Heat, Substance
-from sandmould.casting.arpm.material import EnthalpyTable, ThermalMaterial, enthalpy_table
+from sandmould.casting.arpm.material import READ_AT, EnthalpyTable, ThermalMaterial, enthalpy_table
 from sandmould.casting.arpm.varying import Curves, Transfer
 from sandmould.scenario.casting.curves import ends
 
@@ -38,6 +38,8 @@ class Filling:
     """1/h of eq. (2): between the casting and every other material."""
     transfers: Mapping[tuple[int, int], Transfer] = field(default_factory=dict)
     """Of two materials, the smaller number first, where another one acts."""
+    read_at: float = READ_AT
+    """Solid fraction at which gradients are read."""
 
     def __post_init__(self) -> None:
         if len(self.initial_k) != len(self.materials) or not self.materials:
@@ -80,7 +82,9 @@ class Filling:
     @property
     def table(self) -> EnthalpyTable:
         """Enthalpy counted from the coldest initial temperature: heat that can be lost."""
-        return enthalpy_table(self.materials, min(self.initial_k), max(self.initial_k))
+        return enthalpy_table(
+            self.materials, min(self.initial_k), max(self.initial_k), self.read_at
+        )
 
     def melts(self, elements: Elements) -> Flags:
         """Which elements solidify, (n,) bool."""

@@ -17,15 +17,20 @@ from numba import prange, set_num_threads
 
 from sandmould.arrays import Floats, Ints
 from sandmould.casting.arpm.exchange import Exchange
-from sandmould.casting.arpm.marching import STEP_SHARE, Heat, HeatSystem, Substance
+from sandmould.casting.arpm.marching import (
+    STEP_SHARE,
+    Heat,
+    HeatSystem,
+    Substance,
+    note,
+)
 from sandmould.casting.arpm.material import temperature_of
 from sandmould.casting.arpm.varying import VaryingFaces
 from sandmould.compiled import njit
 
 MOST_LEVELS = 8
-LOOKED_AT, CHANGED_K = 64, 5.0
-"""Shortest steps after which it is looked whether conductances that vary are to be found anew, and
-the change of a temperature from which they are."""
+LOOKED_AT = 64
+"""Shortest steps after which it is looked whether conductances that vary are to be found anew."""
 
 
 class Levels(NamedTuple):
@@ -69,6 +74,7 @@ class LocalSteps:
         level = np.minimum(octave.astype(np.int64), most_levels - 1)
         self._threads = threads
         self._varying: VaryingFaces | None = None
+        self._rated_k, self._changed_k = np.empty(0), math.inf
         self._order = np.argsort(level, kind="stable")
         self._sort(exchange, substance, level[self._order])
         self.volume_m3 = exchange.volume_m3
@@ -90,6 +96,7 @@ class LocalSteps:
         )  # fmt: skip
         if exchange.varying is not None:
             self._varying = exchange.varying.sorted(back, substance.material[order], entry)
+            self._changed_k = self._varying.changed_k
         end = np.searchsorted(level, np.arange(int(level.max()) + 1), side="right")
         row = np.repeat(np.arange(len(level)), count)
         slowest, fastest = level.copy(), level.copy()
@@ -108,37 +115,46 @@ class LocalSteps:
         end[-1] = len(self._order)
         top = count - 1
         levels = Levels(end, *(np.minimum(level, top) for level in self._levels[1:]))
-        enthalpy, temperature, frozen = (
-            values[self._order]
-            for values in (heat.enthalpy_j_m3, heat.temperature_k, heat.frozen_s)
+        enthalpy, temperature, noted = (
+            np.take(values, self._order, axis=-1)
+            for values in (heat.enthalpy_j_m3, heat.temperature_k, heat.noted)
         )
         set_num_threads(self._threads)
         dt = duration_s / (cycles * substeps)
-        some, last_k = max(1, LOOKED_AT // substeps), np.full(len(temperature), np.nan)
+        some = max(1, LOOKED_AT // substeps)
         for begin in range(0, cycles, cycles if self._varying is None else some):
             end_of = cycles if self._varying is None else min(begin + some, cycles)
-            if self._varying is not None and (
-                self._varying.over_time or not np.abs(temperature - last_k).max() < CHANGED_K
-            ):
-                middle_s = heat.time_s + 0.5 * (begin + end_of) * substeps * dt
-                self._system.rate[:] = self._varying.rates_w_m3_k(temperature, middle_s)
-                last_k = temperature.copy()
+            self._follow(heat, temperature, heat.time_s + 0.5 * (begin + end_of) * substeps * dt)
             _local_steps(
                 begin * substeps, end_of * substeps, dt, heat.time_s, levels, self._system,
-                enthalpy, temperature, frozen,
+                enthalpy, temperature, noted,
             )  # fmt: skip
         heat.enthalpy_j_m3[self._order] = enthalpy
         heat.temperature_k[self._order] = temperature
-        heat.frozen_s[self._order] = frozen
+        heat.noted[:, self._order] = noted
         heat.time_s += duration_s
         of_level = np.diff(np.concatenate([[0], end]))
         heat.element_steps += cycles * int((of_level * 2 ** np.arange(top, -1, -1)).sum())
+
+    def _follow(self, heat: Heat, temperature_k: Floats, middle_s: float) -> None:
+        """Find conductances anew where what they follow has changed; it may be another state's."""
+        if self._varying is None:
+            return
+        rated_k = heat.rated_k[self._order]
+        change_k = np.abs(temperature_k - rated_k).max()
+        if self._varying.over_time or not change_k < self._changed_k:
+            rated_k, heat.rated_k = temperature_k, np.empty_like(rated_k)
+            heat.rated_k[self._order] = rated_k
+        elif heat.rated_k is self._rated_k:
+            return
+        self._rated_k = heat.rated_k
+        self._system.rate[:] = self._varying.rates_w_m3_k(rated_k, middle_s)
 
 
 @njit(parallel=True)
 def _update(
     ending: int, at: int, dt: float, time_s: float, levels: Levels, system: HeatSystem,
-    integral: Floats, enthalpy: Floats, temperature: Floats, frozen: Floats, new: Floats,
+    integral: Floats, enthalpy: Floats, temperature: Floats, noted: Floats, new: Floats,
 ) -> None:  # fmt: skip
     """End the steps of the first elements: new enthalpies, and temperatures into ``new``."""
     start, neighbour, rate, material, rows, reference = system
@@ -163,11 +179,8 @@ def _update(
         after = before + taken
         enthalpy[i] = after
         new[i] = temperature_of(after, m, rows, reference)
-        if before >= rows[m, 1] > after:
-            share = (before - rows[m, 1]) / (before - after)
-            frozen[i] = time_s + at * dt - (1.0 - share) * own_dt
-        elif after >= rows[m, 1] > before:
-            frozen[i] = np.nan
+        begin_s = time_s + at * dt - own_dt
+        note(i, m, before, after, begin_s, own_dt, rows, reference, noted)
 
 
 @njit(parallel=True)
@@ -194,7 +207,7 @@ def _integrate(
 @njit()
 def _local_steps(
     begin: int, stop: int, dt: float, time_s: float, levels: Levels, system: HeatSystem,
-    enthalpy: Floats, temperature: Floats, frozen: Floats,
+    enthalpy: Floats, temperature: Floats, noted: Floats,
 ) -> None:  # fmt: skip
     """Take the shortest steps from one to another, both ends of cycles of 2^(levels - 1)."""
     end = levels.end
@@ -204,6 +217,6 @@ def _local_steps(
         while highest < len(end) - 1 and at % (1 << (highest + 1)) == 0:
             highest += 1
         ending = end[highest]
-        _update(ending, at, dt, time_s, levels, system, integral, enthalpy, temperature, frozen,
+        _update(ending, at, dt, time_s, levels, system, integral, enthalpy, temperature, noted,
                 new)  # fmt: skip
         _integrate(ending, at, dt, levels, integral, temperature, new)

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
-from typing import NamedTuple, Protocol
+from typing import Any, NamedTuple, Protocol
 
 import numpy as np
 from numba import prange, set_num_threads
@@ -27,12 +27,19 @@ class Heat:
     """(n,) float64, J/m3."""
     temperature_k: Floats
     """(n,) float64, K."""
-    frozen_s: Floats
-    """(n,) float64, s: when each fell below its solidus; NaN before, once molten again, and where
-    nothing melts."""
+    noted: Floats
+    """(3, n) float64: when each fell below its solidus, s, NaN before, once molten again, and where
+    nothing melts; when each last cooled to where gradients are read, s, and how fast, K/s."""
+    rated_k: Floats
+    """(n,) float64, K: of which conductances that vary were found; NaN before they were."""
     time_s: float = 0.0
     element_steps: int = 0
     """Evaluations of (5) for one element so far."""
+
+    @property
+    def frozen_s(self) -> Floats:
+        """When each fell below its solidus, (n,) float64, s."""
+        return self.noted[0]
 
 
 @dataclass(frozen=True)
@@ -51,7 +58,8 @@ class Substance:
     def heat_at(self, temperature_k: Floats) -> Heat:
         """Heat of elements at temperatures, (n,) float64, K."""
         enthalpy = self.table.enthalpy_j_m3(temperature_k, self.material)
-        return Heat(enthalpy, temperature_k.astype(np.float64), np.full(len(enthalpy), np.nan))
+        noted = np.full((4, len(enthalpy)), np.nan)
+        return Heat(enthalpy, temperature_k.astype(np.float64), noted[:3], noted[3])
 
 
 class HeatSystem(NamedTuple):
@@ -130,18 +138,44 @@ class ExplicitSteps:
         set_num_threads(self._threads)
         heat.temperature_k = _explicit_steps(
             steps, duration_s / steps, heat.time_s, self._system,
-            heat.enthalpy_j_m3, heat.temperature_k, heat.frozen_s,
+            heat.enthalpy_j_m3, heat.temperature_k, heat.noted,
         )  # fmt: skip
         heat.time_s += duration_s
         heat.element_steps += steps * len(self._system.material)
 
 
+@njit(inline="always")
+def note(
+    i: int,
+    m: int,
+    before: float,
+    after: float,
+    begin_s: float,
+    dt: float,
+    rows: Any,
+    reference: float,
+    noted: Any,
+) -> None:
+    """Note what an element of material m passed as its enthalpy changed within a step."""
+    solid, read = rows[m, 1], rows[m, 5]
+    if before >= solid > after:
+        noted[0, i] = begin_s + (before - solid) / (before - after) * dt
+    elif after >= solid > before:
+        noted[0, i] = np.nan
+    if before >= read > after:
+        noted[1, i] = begin_s + (before - read) / (before - after) * dt
+        fell = temperature_of(before, m, rows, reference) - temperature_of(
+            after, m, rows, reference
+        )
+        noted[2, i] = fell / dt
+
+
 @njit(parallel=True)
 def _explicit_steps(
     steps: int, dt: float, time_s: float, system: HeatSystem, enthalpy: Floats, temperature: Floats,
-    frozen: Floats,
+    noted: Floats,
 ) -> Floats:  # fmt: skip
-    """Take explicit steps and give the new temperatures; enthalpy and times change in place.
+    """Take explicit steps and give the new temperatures; enthalpy and notes change in place.
 
     Every element sums over its own neighbours in their order, so that the result does not depend
     on the threads.
@@ -158,10 +192,6 @@ def _explicit_steps(
             after = before + dt * taken
             enthalpy[i] = after
             then[i] = temperature_of(after, m, rows, reference)
-            if before >= rows[m, 1] > after:
-                share = (before - rows[m, 1]) / (before - after)
-                frozen[i] = time_s + (step + share) * dt
-            elif after >= rows[m, 1] > before:
-                frozen[i] = np.nan
+            note(i, m, before, after, time_s + step * dt, dt, rows, reference, noted)
         now, then = then, now
     return now

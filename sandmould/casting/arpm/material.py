@@ -28,6 +28,13 @@ from sandmould.scenario.casting.solidification import Metal, MouldMaterial
 PROPERTIES = ("density_kg_m3", "heat_capacity_j_kg_k", "conductivity_w_m_k")
 NODES = 1024
 """Of a table of temperature over enthalpy: a node each two kelvin or so."""
+READ_AT = 0.7
+"""Solid fraction at which gradient and cooling rate are read, unless another is stated."""
+HEAD = 6
+"""Numbers of a material before those of its curves."""
+LAST_SHARE = 0.1
+"""Of the freezing range, above the solidus, below which nothing is read: what is left at the
+solidus freezes without cooling. Carlson and Beckermann (2009) read there, as remembered."""
 
 
 @dataclass(frozen=True)
@@ -75,6 +82,14 @@ class ThermalMaterial:
     def melts(self) -> bool:
         """Whether it has a solidus."""
         return math.isfinite(self.solidus_k)
+
+    def read_k(self, solid_fraction: float) -> float:
+        """Where gradients are read, K; NaN for what does not freeze over a range."""
+        range_k = self.liquidus_k - self.solidus_k
+        if not (self.melts and range_k > 0.0):
+            return math.nan
+        over_k = np.linspace(self.liquidus_k, self.solidus_k + LAST_SHARE * range_k, NODES)
+        return float(np.interp(solid_fraction, self.solid(over_k), over_k))
 
     @property
     def is_plain(self) -> bool:
@@ -125,9 +140,10 @@ class EnthalpyTable:
     reference_k: float
     """Where the enthalpy is 0."""
     rows: Floats
-    """(m, 5) float64: J/m3/K; enthalpies of solidus and liquidus, J/m3; solidus and liquidus, K.
-    Where a material has curves rows go on: enthalpy at the first of the nodes, J/m3; nodes for
-    a J/m3, 0 for a material without curves; temperature at each node, K."""
+    """(m, 6) float64: J/m3/K; enthalpies of solidus and liquidus, J/m3; solidus and liquidus, K;
+    enthalpy at which gradients are read, J/m3. Where a material has curves all rows go on: number
+    of the node at no enthalpy, nodes for a J/m3; of the straight lines that begin at each node the
+    temperature at no enthalpy, K, and the slope, K m3/J."""
 
     def enthalpy_j_m3(self, temperature_k: Floats, material: Ints) -> Floats:
         """Enthalpy of elements; one on an isothermal front (solidus = liquidus) is liquid.
@@ -141,6 +157,14 @@ class EnthalpyTable:
         -------
         (n,) float64, J/m3
         """
+        if self.rows.shape[1] > HEAD:
+            found = np.empty(len(temperature_k))
+            for m in np.unique(material):
+                own, (shift, density) = material == m, self.rows[m, HEAD : HEAD + 2]
+                heat = (np.arange(NODES) - shift) / density
+                at_0_k, slope = self.rows[m, HEAD + 2 :].reshape(2, NODES)
+                found[own] = np.interp(temperature_k[own], at_0_k + slope * heat, heat)
+            return found
         capacity, solid, liquid, solidus, liquidus = self.rows[material, :5].T
         below = capacity * (temperature_k - self.reference_k)
         melting = np.isfinite(solidus) & (temperature_k >= solidus)
@@ -149,14 +173,7 @@ class EnthalpyTable:
             share = (temperature_k - solidus) / (liquidus - solidus)
             mushy = solid + share * (liquid - solid)
             above = liquid + capacity * (temperature_k - liquidus)
-        found = np.where(liquids, above, np.where(melting, mushy, below))
-        for m in np.unique(material):
-            if self.rows.shape[1] > 5 and (density := self.rows[m, 6]) > 0.0:
-                heat = self.rows[m, 5] + np.arange(NODES) / density
-                found[material == m] = np.interp(
-                    temperature_k[material == m], self.rows[m, 7:], heat
-                )
-        return found
+        return np.where(liquids, above, np.where(melting, mushy, below))
 
     def temperature_k(self, enthalpy_j_m3: Floats, material: Ints) -> Floats:
         """Temperature of elements, (n,) float64, K; the inverse of ``enthalpy_j_m3``."""
@@ -164,7 +181,10 @@ class EnthalpyTable:
 
 
 def enthalpy_table(
-    materials: Sequence[ThermalMaterial], reference_k: float, hottest_k: float = 0.0
+    materials: Sequence[ThermalMaterial],
+    reference_k: float,
+    hottest_k: float = 0.0,
+    read_at: float = READ_AT,
 ) -> EnthalpyTable:
     """Tabulate materials.
 
@@ -176,15 +196,18 @@ def enthalpy_table(
         the heat that is there to be lost.
     hottest_k : float, K
         To where curves are tabulated.
+    read_at : float
+        Solid fraction at which gradients are read.
     """
     plain = all(it.is_plain for it in materials)
-    rows = np.zeros((len(materials), 5 if plain else 7 + NODES))
-    for row, it in zip(rows, materials, strict=True):
-        if it.is_plain:
-            row[:5] = _line(it, reference_k)
-        else:
-            row[:] = _curves(it, reference_k, max(hottest_k, it.liquidus_k if it.melts else 0.0))
-    return EnthalpyTable(reference_k, rows)
+    hottest_k = max([hottest_k, *(it.liquidus_k for it in materials if it.melts)])
+    rows = [
+        _line(it, reference_k) if plain else _curves(it, reference_k, hottest_k) for it in materials
+    ]
+    table = EnthalpyTable(reference_k, np.array(rows))
+    read_k = np.array([it.read_k(read_at) for it in materials])
+    table.rows[:, 5] = table.enthalpy_j_m3(read_k, np.arange(len(materials)))
+    return table
 
 
 def _line(it: ThermalMaterial, reference_k: float) -> tuple[float, ...]:
@@ -193,7 +216,7 @@ def _line(it: ThermalMaterial, reference_k: float) -> tuple[float, ...]:
     mushy_k = it.liquidus_k - it.solidus_k if it.melts else 0.0
     density = ends(it.density_kg_m3)[0]
     liquid = solid + capacity * mushy_k + density * it.latent_heat_j_kg
-    return capacity, solid, liquid, it.solidus_k, it.liquidus_k
+    return capacity, solid, liquid, it.solidus_k, it.liquidus_k, math.nan
 
 
 def _integral(values: Floats, over: Floats) -> Floats:
@@ -228,18 +251,21 @@ def _curves(it: ThermalMaterial, reference_k: float, hottest_k: float) -> Floats
     least = it.capacities_j_m3_k(place).min()
     nodes = np.linspace(heat[0], heat[-1], NODES)
     per_node = (NODES - 1) / (heat[-1] - heat[0])
-    head = [least, solidus, liquidus, it.solidus_k, it.liquidus_k, heat[0], per_node]
-    return np.concatenate([head, np.interp(nodes, heat, place)])
+    node_k = np.interp(nodes, heat, place)
+    slope = np.diff(node_k, append=node_k[-1]) * per_node
+    slope[-1] = slope[-2]
+    head = [least, solidus, liquidus, it.solidus_k, it.liquidus_k, math.nan]
+    numbers = [-heat[0] * per_node, per_node]
+    return np.concatenate([head, numbers, node_k - slope * nodes, slope])
 
 
 @njit(inline="always")
 def temperature_of(enthalpy: float, m: int, rows: Any, reference: float) -> Any:
     """Temperature (K) of an enthalpy (J/m3) of material m; compiled code takes it in."""
-    if rows.shape[1] > 5 and rows[m, 6] > 0.0:
-        place = (enthalpy - rows[m, 5]) * rows[m, 6]
-        node = int(min(max(place, 0.0), rows.shape[1] - 9.0))
-        low = rows[m, 7 + node]
-        return low + (place - node) * (rows[m, 8 + node] - low)
+    if rows.shape[1] > HEAD:
+        # whole numbers are bounded in less time
+        node = min(max(int(enthalpy * rows[m, HEAD + 1] + rows[m, HEAD]), 0), NODES - 2)
+        return rows[m, HEAD + 2 + node] + rows[m, HEAD + 2 + NODES + node] * enthalpy
     if enthalpy < rows[m, 1]:
         return reference + enthalpy / rows[m, 0]
     if enthalpy < rows[m, 2]:

@@ -8,6 +8,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
+from sandmould.arrays import Flags
 from sandmould.bad_input import BadInputError, Problem
 from sandmould.casting.arpm.cut import with_cut
 from sandmould.casting.arpm.elements import Elements, placed
@@ -17,7 +18,7 @@ from sandmould.casting.arpm.kernel import check_sizes
 from sandmould.casting.arpm.marching import STEP_SHARE
 from sandmould.casting.arpm.material import ThermalMaterial, thermal
 from sandmould.casting.arpm.method import HeatMethod
-from sandmould.casting.arpm.raster import CASTING, MOULD, Raster, painted
+from sandmould.casting.arpm.raster import CASTING, MOULD, Raster, inside_solid, painted
 from sandmould.casting.arpm.varying import Transfer
 from sandmould.scenario.casting.shapes import Body, Rectangle, solid_of
 from sandmould.scenario.casting.solidification import Solidification
@@ -120,6 +121,17 @@ def elements_of(scenario: Solidification) -> Elements:
     return _elements(_drawing(scenario), scenario.layers)
 
 
+def risers_of(scenario: Solidification, elements: Elements) -> Flags:
+    """Which elements lie in risers and in no other part of the casting, (n,) bool."""
+    found = np.zeros(len(elements.size_m), dtype=np.bool_)
+    # the casting's own parts come last and take what they share
+    for is_riser in (True, False):
+        for number, solid in enumerate(solids_of(scenario) if scenario.risers else ()):
+            if (number in scenario.risers) == is_riser:
+                found[inside_solid(solid, elements.position_m)] = is_riser
+    return found
+
+
 def drawn_raster(scenario: Solidification) -> Raster:
     """Cells with the volumes and areas of the drawing, for those who exchange over faces.
 
@@ -149,7 +161,9 @@ def filling_of(scenario: Solidification) -> Filling:
                       for n in range(len(materials))}  # fmt: skip
         materials.append(AIR)
         initial_k.append(air.temperature_k)
-    return Filling(tuple(materials), tuple(initial_k), transfers=transfers)
+    return Filling(
+        tuple(materials), tuple(initial_k), 0.0, transfers, scenario.read_at_solid_fraction
+    )
 
 
 def method_of(scenario: Solidification) -> HeatMethod:
@@ -193,6 +207,9 @@ def _misfits(scenario: Solidification) -> Iterator[Problem]:
     if scenario.exchange in KERNEL_FORMS and scenario.layers and scenario.kernel_size < 2.0:
         yield Problem("kernel_size", scenario.kernel_size, "at least 2 where sizes double")
     yield from _places(scenario)
+    for i, number in enumerate(scenario.risers):
+        if number >= len(scenario.shapes):
+            yield Problem(f"risers.{i}", number, f"at most {len(scenario.shapes) - 1}, a shape")
     names = [probe.name for probe in scenario.probes]
     for i, probe in enumerate(scenario.probes):
         if probe.name in names[:i]:
@@ -257,6 +274,20 @@ def expected_s(scenario: Solidification) -> float:
     """
     it = cooled_of(scenario)
     return min(freezes_s(scenario, it, it.sand_depth_m), scenario.until_s)
+
+
+def drawn_volume_m3(scenario: Solidification) -> float:
+    """Volume of the casting as drawn; area in m2 in 2D.
+
+    What several shapes hold counts once, as far as cells of the smallest size tell.
+    """
+    solids, raster = solids_of(scenario), raster_of(scenario)
+    drawn_m3 = sum(abs(solid.measure) for solid in solids)
+    if len(solids) == 1:
+        return drawn_m3
+    holders = np.sum([inside_solid(solid, raster.centre_m) for solid in solids], axis=0)
+    again = int(np.maximum(holders - 1, 0).sum())
+    return drawn_m3 - again * raster.cell_m**scenario.dimensions
 
 
 def held_volume_m3(scenario: Solidification) -> float:

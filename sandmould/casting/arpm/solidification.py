@@ -80,8 +80,8 @@ class Cooling:
     def of(cls, arrays: Mapping[str, Any]) -> Cooling:
         """Take up what ``arrays`` gave."""
         heat = Heat(
-            arrays["enthalpy_j_m3"], arrays["temperature_k"], arrays["frozen_s"],
-            float(arrays["time_s"]), int(arrays["element_steps"]),
+            arrays["enthalpy_j_m3"], arrays["temperature_k"], arrays["noted"],
+            arrays["rated_k"], float(arrays["time_s"]), int(arrays["element_steps"]),
         )  # fmt: skip
         return cls(
             heat, arrays["times_s"].tolist(), list(arrays["probe_k"]),

@@ -19,6 +19,7 @@ from sandmould.casting.arpm.marching import (
     HeatSystem,
     Substance,
     heat_system,
+    note,
 )
 from sandmould.casting.arpm.material import temperature_of
 from sandmould.compiled import njit
@@ -101,7 +102,7 @@ class SuperSteps:
         set_num_threads(self._threads)
         heat.enthalpy_j_m3 = _super_steps(
             steps, duration_s / steps, heat.time_s, weights, self._system,
-            heat.enthalpy_j_m3, heat.temperature_k, heat.frozen_s,
+            heat.enthalpy_j_m3, heat.temperature_k, heat.noted,
         )  # fmt: skip
         heat.time_s += duration_s
         heat.element_steps += steps * stages * len(self._system.material)
@@ -140,10 +141,10 @@ def _stage(
 @njit()
 def _super_steps(
     steps: int, dt: float, time_s: float, weights: Floats, system: HeatSystem, enthalpy: Floats,
-    temperature: Floats, frozen: Floats,
+    temperature: Floats, noted: Floats,
 ) -> Floats:  # fmt: skip
-    """Take super steps; temperatures and freezing times change in place, enthalpy comes back."""
-    material, rows = system.material, system.rows
+    """Take super steps; temperatures and notes change in place, enthalpy comes back."""
+    material, rows, reference = system.material, system.rows, system.reference
     n = len(enthalpy)
     begin, last, older = enthalpy.copy(), np.empty(n), np.empty(n)
     at_begin, taken = np.empty(n), np.empty(n)
@@ -158,11 +159,6 @@ def _super_steps(
             _stage(weights[j], dt, begin, at_begin, last, older, taken, system, temperature)
             last, older = older, last
         for i in range(n):
-            solid = rows[material[i], 1]
-            if begin[i] >= solid > last[i]:
-                share = (begin[i] - solid) / (begin[i] - last[i])
-                frozen[i] = time_s + (step + share) * dt
-            elif last[i] >= solid > begin[i]:
-                frozen[i] = np.nan
+            note(i, material[i], begin[i], last[i], time_s + step * dt, dt, rows, reference, noted)
         begin, last = last, begin
     return begin

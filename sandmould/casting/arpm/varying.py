@@ -17,6 +17,8 @@ from sandmould.scenario.casting.curves import Curve, along, ends
 
 PLACES = 1024
 """Temperatures of a table."""
+CHANGED = 0.01
+"""Share by which a conductivity or resistance may have changed before all are found anew."""
 
 
 @dataclass(frozen=True)
@@ -91,6 +93,15 @@ class VaryingFaces:
     def over_time(self) -> bool:
         """Whether something changes with time alone."""
         return any(it.over_time and it.varies for it in self.curves.transfers.values())
+
+    @property
+    def changed_k(self) -> float:
+        """Least change of temperature with which one of them may have changed so much, K."""
+        transfers = self.curves.transfers.values()
+        at = np.linspace(self.curves.low_k, self.curves.high_k, PLACES)
+        resistance = [it.resistance_m2k_w(at, 0.0) for it in transfers if it.varies]
+        steepest = np.abs(np.diff(np.log([*self.conductivity_w_m_k, *resistance]))).max()
+        return float(CHANGED * (at[1] - at[0]) / max(steepest, 1e-12))
 
     def sorted(self, back: Ints, material: Ints, entry: Ints) -> VaryingFaces:
         """The same for elements in another order.

@@ -178,6 +178,15 @@ def fluid_of(scenario: MetalFlow) -> int:
     return _counts(scenario.case)[2]
 
 
+def mass_percent(scenario: MetalFlow) -> float:
+    """What the particles of a full mould hold over what is drawn, less 100, %."""
+    case = scenario.case
+    if isinstance(case, StillTank):
+        return 0.0
+    held_m3 = fluid_of(scenario) * case.particle_m**3
+    return 100.0 * (held_m3 / PAPERS.volume_m3 - 1.0)
+
+
 def expected_work(scenario: MetalFlow) -> float:
     """Foresee the work of a run, as ``flow.Cost`` counts it.
 

@@ -60,6 +60,11 @@ class Casting:
         sites = self.sites(size_m)
         return sites[self.holds(sites)]
 
+    @property
+    def volume_m3(self) -> float:
+        """As drawn."""
+        return math.pi / 8.0 * (self.lower_m**2 + self.upper_m**2) * self.height_m
+
     def level_m(self, size_m: float, particles: int) -> float:
         """Height that so many particles fill the mould to."""
         sites = self.sites(size_m)

@@ -10,6 +10,7 @@ from pathlib import Path
 from sandmould.bad_input import Problem
 from sandmould.casting.mps import computation, scene, source_hash
 from sandmould.casting.mps.shoulder import PAPERS, POUR_M_S
+from sandmould.casting.mps.stability_measures import beyond_map
 from sandmould.kinds.casting import CastingPlanning
 from sandmould.kinds.kind import BASE_MEMORY_MB, SpeedClass
 from sandmould.kinds.stored_speed import StoredSpeed
@@ -104,9 +105,15 @@ class FlowPlanning(CastingPlanning[MetalFlow]):
         }
 
     def notes(self, scenario: MetalFlow) -> tuple[Note, ...]:
-        """Poured metal whose particles may pass through each other."""
+        """Where the method ends, and what its particles make of a casting."""
         pours = not isinstance(scenario.case, StillTank)
-        return notes("plan_flow.j2", passes=pours and scenario.collision_distance == 0.0)
+        return notes(
+            "plan_flow.j2",
+            pours=pours,
+            passes=pours and scenario.collision_distance == 0.0,
+            beyond=beyond_map(scenario),
+            mass_percent=scene.mass_percent(scenario),
+        )
 
 
 def _limit_problems(scenario: MetalFlow) -> Iterator[Problem]:

@@ -10,11 +10,13 @@ from typing import Any
 
 import pandas as pd
 
+from sandmould.analysis.feeding import feeding
 from sandmould.analysis.freezing import Freezing, freezing
 from sandmould.casting.arpm import computation, scene
-from sandmould.definition.run import Run
+from sandmould.definition.run import CURVES, Run
 from sandmould.kinds.casting import CastingExecution, read_fields, write_measures, write_picture
 from sandmould.scenario.casting.solidification import Solidification
+from sandmould.scenario.units import ZERO_K
 
 
 class SolidificationExecution(CastingExecution[Solidification]):
@@ -36,10 +38,13 @@ class SolidificationExecution(CastingExecution[Solidification]):
             for axis, place_m in zip("xyz", frozen.last_point_m, strict=False):
                 table[f"last_point_{axis}_m"] = place_m
             table["hot_spots"] = len(frozen.hot_spots_m)
+            if fed := feeding(fields):
+                table["cut_off_fraction"] = fed.cut_off_fraction
+                table["low_niyama_fraction"] = fed.low_fraction
         write_measures(folder, table)
 
     def export(self, run: Run, folder: Path) -> None:
-        """Draw how the metal froze, and write the fields for ParaView."""
+        """Draw how the metal froze; write the fields for ParaView and the curves for a sheet."""
         from sandmould.analysis.export import elements_to_vtk
         from sandmould.analysis.freezing_plots import draw_freezing
 
@@ -48,6 +53,11 @@ class SolidificationExecution(CastingExecution[Solidification]):
             elements_to_vtk(fields, folder / "fields.vtu")
             draw = partial(draw_freezing, fields, _frozen(run.scenario, fields))
         write_picture(folder, (6, 5), draw)
+        series = pd.read_csv(folder / "series.tsv", sep="\t")
+        names = {f"{probe.name}_k": f"{probe.name}_degc" for probe in run.scenario.probes}
+        curves = (series[list(names)] - ZERO_K).rename(columns=names)
+        curves.insert(0, "time_s", series["time_s"])
+        curves.to_csv(folder / CURVES, index=False, float_format="%.6g")
 
 
 def _frozen(scenario: Solidification, fields: Mapping[str, Any]) -> Freezing:

@@ -33,8 +33,7 @@ def notes(scenario: Solidification) -> tuple[Note, ...]:
     """Notes of one scenario that has no problems."""
     it = scene.cooled_of(scenario)
     share = least_sand_share(scenario, it)
-    drawn = sum(abs(solid.measure) for solid in scene.solids_of(scenario))
-    held = scene.held_volume_m3(scenario)
+    drawn, held = scene.drawn_volume_m3(scenario), scene.held_volume_m3(scenario)
     return templates.notes(
         "plan_solidification.j2",
         scenario=scenario,

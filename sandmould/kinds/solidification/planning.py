@@ -75,6 +75,7 @@ class SolidificationPlanning(CastingPlanning[Solidification]):
     )
     measuring = (
         *CastingPlanning.measuring,
+        "sandmould/analysis/feeding.py",
         "sandmould/analysis/freezing.py",
         "sandmould/kinds/solidification/execution.py",
     )

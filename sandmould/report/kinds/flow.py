@@ -22,7 +22,13 @@ from sandmould.analysis.flow_plots import draw_frame, frame_of
 from sandmould.casting.mps import scene
 from sandmould.casting.mps.scheme import G_M_S2
 from sandmould.casting.mps.shoulder import HOP_SPEED_M_S, PAPERS
-from sandmould.casting.mps.stability_measures import NOISE_WINDOW_S, QUIET_PA, StabilityRating
+from sandmould.casting.mps.stability_measures import (
+    MOST_OFF,
+    NOISE_WINDOW_S,
+    QUIET_PA,
+    StabilityRating,
+    beyond_map,
+)
 from sandmould.drawing.animation import evenly
 from sandmould.drawing.figure_files import numbered, pictures
 from sandmould.drawing.figures import png
@@ -121,6 +127,10 @@ def _pages(findings: Findings[MetalFlow], film_budget_bytes: int) -> KindPages:
             "flow_grounds.j2",
             at=scene.deepest(scenario),
             quiet_pa=QUIET_PA,
+            most_off=MOST_OFF,
+            beyond=[name_of(key) for key in beyond_map(scenario)],
+            pours=not isinstance(scenario.case, StillTank),
+            mass_percent=scene.mass_percent(scenario),
             gradient=scene.scheme_of(scenario).gradient,
         ),
         steps=_steps(scenario, ranked),
@@ -199,6 +209,8 @@ def _calm(scenario: MetalFlow, ranked: pd.DataFrame, keys: Sequence[str]) -> str
         "calm.j2",
         labels=[setting_text({key: row[key] for key in keys}) for _, row in ranked.iterrows()],
         calm=verdicts.count(StabilityRating.EXCELLENT.value),
+        biased=verdicts.count(StabilityRating.BIASED.value),
+        most_off=MOST_OFF,
         stopped=verdicts.count(StabilityRating.FAILED.value),
         noise_pa=next(iter(noise_pa), math.nan),
     )
@@ -210,6 +222,8 @@ def _steps(scenario: MetalFlow, ranked: pd.DataFrame) -> tuple[NextStep, ...]:
         return ()
     if (ranked[CLASSIFICATION] == StabilityRating.EXCELLENT.value).any():
         return (NextStep("Pour with the calm setting: the study shoulder_pour shows how."),)
+    if (ranked[CLASSIFICATION] == StabilityRating.BIASED.value).any():
+        return (NextStep("Take smaller particles: the pressure is calm, but its mean is off."),)
     return (NextStep("Try more relaxations, a smaller c_poi (source_share) or a smaller step."),)
 
 
@@ -306,6 +320,7 @@ def _method(scenario: MetalFlow, keys: Sequence[str]) -> tuple[Note, ...]:
         scheme=scene.scheme_of(scenario),
         collides_as_swept="collision_distance" in keys,
         quiet_pa=QUIET_PA,
+        most_off=MOST_OFF,
         swept=[name_of(key) for key in keys],
     )
 

@@ -55,6 +55,8 @@ class KindPages:
     """How sure the answer is."""
     steps: tuple[NextStep, ...] = ()
     """What to do next that other kinds do not ask for."""
+    findings: tuple[str, ...] = ()
+    """What stands below the answer, a sentence or two each."""
     warning: str = ""
     """Why the verdict is to be doubted, beside it; empty where there is no reason."""
 

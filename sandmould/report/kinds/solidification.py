@@ -13,12 +13,21 @@ from pathlib import Path
 import numpy as np
 import pandas as pd
 from matplotlib.figure import Figure
+from matplotlib.layout_engine import ConstrainedLayoutEngine
+from numpy.typing import NDArray
 
-from sandmould.analysis.freezing import freezing
-from sandmould.analysis.freezing_plots import DistanceM, draw_freezing, draw_temperature
+from sandmould.analysis.feeding import NIYAMA_LOW, Feeding, feeding
+from sandmould.analysis.freezing import Freezing, freezing
+from sandmould.analysis.freezing_plots import (
+    DistanceM,
+    draw_freezing,
+    draw_modulus,
+    draw_niyama,
+    draw_temperature,
+)
 from sandmould.casting.arpm.scene import solids_of
 from sandmould.definition.sweep import Point
-from sandmould.drawing.chart import Chart, Mark, tints
+from sandmould.drawing.chart import PLAIN, Chart, Line, Mark, tints
 from sandmould.drawing.figure_files import numbered, pictures
 from sandmould.drawing.figures import png
 from sandmould.drawing.sphere_film import bare_film
@@ -29,9 +38,10 @@ from sandmould.report.tables import Cell, Column, Table
 from sandmould.report.time_series import curve_figures, measure_curves
 from sandmould.runs.columns import CPU_S, RUN, SOLIDIFICATION_TIME_S, TIME_S, finished
 from sandmould.runs.formatting import is_number, listed, name_of, number, seconds, setting_text
-from sandmould.runs.templates import Note, notes, worded
+from sandmould.runs.templates import Note, notes, sentences, worded
 from sandmould.scenario.casting.shapes import Body
 from sandmould.scenario.casting.solidification import Solidification
+from sandmould.scenario.units import ZERO_K
 from sandmould.statistics.answer import Answer
 from sandmould.statistics.refining import resolution_among
 from sandmould.statistics.verdict import rank_runs
@@ -40,6 +50,13 @@ from sandmould.wording.next_steps import NextStep
 
 NEAR_PERCENT = 5.0
 """Off the reference's solidification time: as near as the answer takes for good."""
+_ROOMY = ConstrainedLayoutEngine(w_pad=0.12, h_pad=0.1)
+"""Labels keep away from the edge."""
+MOST_POINTS = 600
+"""Of a cooling curve."""
+MOST_BOXES = 5
+LAST_SHARE = 0.98
+"""Of the casting's time, from which on what flows is shown as the last."""
 
 
 @dataclass(frozen=True)
@@ -70,19 +87,21 @@ def _pages(findings: Findings[Solidification], film_budget_bytes: int) -> KindPa
     best = _run_of(collected.summary, findings.answer) if study.seeks_best or not reference else ""
     run = _pictured_run(reference, collected, best)
     folder = findings.study_folder / "runs" / run
-    probes = [f"{probe.name}_k" for probe in scenario.probes]
-    curves = measure_curves(collected, verdict, [*probes, "solidified_fraction"])
-    fields, first, sentences, spots = _fields(folder, scenario)
+    cooling = _cooling(run, collected.curves, scenario)
+    curves = measure_curves(collected, verdict, ["solidified_fraction"])
+    fields, first, said, tables, fed = _fields(folder, scenario)
     errors = _errors(reference, scenario, collected) if reference else []
     error_cost = _error_charts(errors)
     stand_ins = _stand_ins(findings.answer.stand_ins)
     shown = {
         "pictured_run": run,
-        "scene": _scene(folder, scenario) if fields else None,
+        "scene": _scene(folder, scenario, fed) if fed else None,
         "films": (bare_film(run),),
         "fields": fields,
-        "sentences": (*sentences, *stand_ins),
-        "spots": spots,
+        "sentences": stand_ins,
+        "tables": tables,
+        "cooling": cooling,
+        "has_risers": bool(scenario.risers),
         "curves": curves,
         "reference": setting_text(reference) if reference else "",
         "error_cost": error_cost,
@@ -95,9 +114,10 @@ def _pages(findings: Findings[Solidification], film_budget_bytes: int) -> KindPa
         figures={
             **pictures(fields=fields),
             **numbered("error_cost", error_cost),
-            **curve_figures(curves),
+            **curve_figures([*([cooling] if cooling else []), *curves]),
         },
         picture=first,
+        findings=said,
         answer="" if study.seeks_best else _cheapest(errors, reference, collected),
         grounds=notes(
             "casting_grounds.j2",
@@ -152,36 +172,121 @@ def _of_point(summary: pd.DataFrame, reference: Point) -> pd.DataFrame:
 
 def _fields(
     folder: Path, scenario: Solidification
-) -> tuple[str, FirstPicture | None, tuple[str, ...], Table | None]:
-    """Pictures of a run's fields, what they say in words, and its hot spots."""
+) -> tuple[str, FirstPicture | None, tuple[str, ...], tuple[Table, ...], Feeding | None]:
+    """Pictures of a run's fields, what they say in words, its hot spots and what is cut off."""
     if not (folder / "fields.npz").is_file():
-        return "", None, ("No run has left fields.",), None
+        return "", None, ("No run has left fields.",), (), None
     with np.load(folder / "fields.npz", allow_pickle=False) as file:
         fields = dict(file)
     melts = fields["melts"]
-    frozen = freezing(
-        fields["position_m"][melts], fields["frozen_s"][melts], scenario.hot_spot_reach_m
-    )
+    place_m = fields["position_m"][melts]
+    frozen = freezing(place_m, fields["frozen_s"][melts], scenario.hot_spot_reach_m)
+    fed = feeding(fields)
     distance_m = distance_from(solids_of(scenario))
-    figure = Figure(figsize=(11, 4.6), dpi=110, layout="constrained")
-    left, right = figure.subplots(1, 2)
-    draw_freezing(fields, frozen, left, distance_m)
-    draw_temperature(fields, frozen, right, distance_m)
-    alone = Figure(figsize=(5.6, 4.6), dpi=110, layout="constrained")
+    reads = fed is not None and math.isfinite(fed.low_fraction)
+    figure = Figure(figsize=(11, 9.2), dpi=110, layout=_ROOMY)
+    (first_axes, end), (third, fourth) = figure.subplots(2, 2)
+    draw_freezing(fields, frozen, first_axes, distance_m)
+    draw_temperature(fields, frozen, end, distance_m)
+    has_modulus = fed is not None and bool(np.isfinite(fields["modulus_m"]).any())
+    for axes, draw, is_known in ((third, draw_modulus, has_modulus), (fourth, draw_niyama, reads)):
+        if is_known:
+            draw(fields, frozen, axes)
+        else:
+            axes.set_axis_off()
+    alone = Figure(figsize=(5.6, 4.6), dpi=110, layout=_ROOMY)
     draw_freezing(fields, frozen, alone.subplots(), distance_m)
     alt = f"When each part of the casting froze in run {folder.name}, with its outline"
     caption = "When each part of the casting froze, and the part as drawn (line)"
     where = ", cut through the last point to freeze" if scenario.dimensions == 3 else ""
     first = FirstPicture(png(alone), alt, f"{caption}{where}.")
-    is_solid = math.isfinite(frozen.solidification_time_s)
-    said = worded("frozen.j2", it=frozen, is_solid=is_solid)
-    axes = [Column(f"{name}, mm") for name in "yz"[: scenario.dimensions - 1]]
+    last = np.argmin(np.linalg.norm(place_m - frozen.last_point_m, axis=1))
+    said = sentences(
+        "frozen.j2",
+        it=frozen,
+        fed=fed,
+        is_solid=math.isfinite(frozen.solidification_time_s),
+        in_riser=fed is not None and bool(fields["riser"][melts][last]),
+        has_risers=bool(scenario.risers),
+        reads=reads,
+        limit=1e-3 * NIYAMA_LOW,
+        flat=scenario.dimensions == 2,
+    )
+    tables = (_spots(frozen), *([_cut_off(fed, scenario.dimensions)] if fed else []))
+    return png(figure), first, said, tables, fed
+
+
+def _spots(frozen: Freezing) -> Table:
+    """Hot spots."""
+    axes = [Column(f"{name}, mm") for name in "yz"[: frozen.hot_spots_m.shape[1] - 1]]
     columns = (Column("hot spot at x, mm"), *axes, Column("frozen after, s"))
     rows = tuple(
         tuple(Cell(number(v, 4), str(v)) for v in (*(1e3 * place), time_s))
         for place, time_s in zip(frozen.hot_spots_m, frozen.hot_spot_s, strict=True)
     )
-    return png(figure), first, (said,), Table(columns, rows, (False,) * len(rows))
+    return Table(columns, rows, (False,) * len(rows))
+
+
+def _cut_off(fed: Feeding, dimensions: int) -> Table:
+    """Liquid that is cut off."""
+    volume, factor = ("area, mm²", 1e6) if dimensions == 2 else ("volume, mm³", 1e9)
+    columns = (
+        Column("liquid from, mm", False),
+        Column("to, mm", False),
+        Column(volume),
+        Column("cut off after, s"),
+        Column("flows until, s"),
+        Column("path closes at, mm", False),
+        Column("path to the nearest riser, mm"),
+    )
+
+    def place(at_m: NDArray[np.float64]) -> Cell:
+        text = ", ".join(number(1e3 * v) for v in at_m) if np.isfinite(at_m).all() else "-"
+        return Cell(text, text)
+
+    rows = tuple(
+        (
+            place(it.region.low_m),
+            place(it.region.high_m),
+            *(
+                Cell(number(v), str(v))
+                for v in (factor * it.region.volume_m3, it.cut_off_s, it.solid_s)
+            ),
+            place(it.throat_m),
+            Cell(number(1e3 * it.path_m), str(it.path_m)),
+        )
+        for it in fed.cut_off
+    )
+    return Table(columns, rows, (False,) * len(rows))
+
+
+def _cooling(run: str, curves: pd.DataFrame, scenario: Solidification) -> Chart | None:
+    """Cooling curves of all probes of a run; of the other runs faint, behind them."""
+    names = [probe.name for probe in scenario.probes]
+    if not names or curves.empty:
+        return None
+    lines = []
+    for name, tint in zip(names, tints(len(names), False), strict=True):
+        for of, own in curves.groupby(RUN):
+            xy = own[[TIME_S, f"{name}_k"]].to_numpy(dtype=np.float64) - [0.0, ZERO_K]
+            xy = xy[:: max(1, len(xy) // MOST_POINTS)]
+            own_line = of == run
+            lines.append(
+                Line(
+                    xy,
+                    tint,
+                    "mean" if own_line else "behind",
+                    name if own_line else "",
+                    f"{name}, {of}",
+                )
+            )
+    end_s = float(curves[TIME_S].max())
+    for what in ("liquidus", "solidus"):
+        at = getattr(scenario.casting, f"{what}_k") - ZERO_K
+        lines.append(Line(np.array([[0.0, at], [end_s, at]]), PLAIN, "joined", title=what))
+    lines.sort(key=lambda line: line.style == "mean")
+    alt = f"Cooling curves of {listed(names)} in degrees C, with liquidus and solidus."
+    return Chart("time, s", "temperature, °C", alt, tuple(lines))
 
 
 def distance_from(solids: Sequence[Body]) -> DistanceM:
@@ -189,8 +294,11 @@ def distance_from(solids: Sequence[Body]) -> DistanceM:
     return lambda places_m: np.min([solid.distance_m(places_m) for solid in solids], axis=0)
 
 
-def _scene(folder: Path, scenario: Solidification) -> dict[str, object] | None:
-    """The casting for the 3D view, coloured by when it froze; None in two dimensions."""
+def _scene(folder: Path, scenario: Solidification, fed: Feeding) -> dict[str, object] | None:
+    """The casting for the 3D view, coloured by when it froze; None in two dimensions.
+
+    Boxes stand round liquid that is cut off, and round what flows last.
+    """
     if scenario.dimensions == 2:
         return None
     with np.load(folder / "fields.npz", allow_pickle=False) as file:
@@ -203,7 +311,18 @@ def _scene(folder: Path, scenario: Solidification) -> dict[str, object] | None:
     ends = f"frozen after {number(low_s)} s", f"{number(high_s)} s"
     field = SurfaceField("time of freezing", place_m, frozen_s, low_s, high_s, ends, size_m)
     low_m, high_m = np.array(scenario.box.low_m), np.array(scenario.box.high_m)
-    return solid_scene(solids_of(scenario), low_m, high_m, [field])
+    late_m = place_m[~(frozen_s < LAST_SHARE * high_s)]
+    boxes = [(it.region.low_m, it.region.high_m) for it in fed.cut_off[:MOST_BOXES]]
+    boxes.append((late_m.min(axis=0), late_m.max(axis=0)))
+    scene = solid_scene(solids_of(scenario), low_m, high_m, [field])
+    return scene | {"marks": [_edges(low - low_m, high - low_m) for low, high in boxes]}
+
+
+def _edges(low_m: NDArray[np.float64], high_m: NDArray[np.float64]) -> list[float]:
+    """Ends of the twelve edges of a box, one after another."""
+    corner = np.indices((2, 2, 2)).reshape(3, -1).T
+    ends = [(i, i | 1 << k) for k in range(3) for i in range(8) if not i & 1 << k]
+    return (low_m + corner[np.array(ends)] * (high_m - low_m)).round(6).ravel().tolist()
 
 
 def _errors(point: Point, scenario: Solidification, collected: Collected) -> list[_Error]:

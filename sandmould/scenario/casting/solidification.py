@@ -195,6 +195,11 @@ class Solidification(MetalAndMould):
     shapes: tuple[Shape, ...] = Field(
         ..., min_length=1, description="Parts of the casting; they may touch and overlap."
     )
+    risers: tuple[Annotated[int, Field(ge=0)], ...] = quantity(
+        (),
+        "Which of the shapes are risers, counted from 0: they feed the others.",
+        source="user",
+    )
     inserts: tuple[Insert, ...] = Field(
         (), description="Chills, cores, sleeves and other moulds within the mould."
     )
@@ -221,6 +226,14 @@ class Solidification(MetalAndMould):
     record_s: float = quantity(5.0, "Between records.", unit="s", source=ARGUED, gt=0)
     until_s: float = quantity(
         20000.0, "The run ends here if something is still liquid.", unit="s", source=ARGUED, gt=0
+    )
+    read_at_solid_fraction: float = quantity(
+        0.7,
+        "Solid fraction at which gradient, cooling rate and Niyama's value are read, and up to "
+        "which metal flows; at least a tenth of the freezing range above the solidus.",
+        source=ARGUED,
+        gt=0,
+        lt=1,
     )
     hot_spot_reach_m: float = quantity(
         0.02,

@@ -31,8 +31,9 @@ def history(deviation_pa: float, top_m: float) -> History:
     return History(np.cumsum(dt_s), dt_s, pressure, pressure, still, still, still, still + top_m)
 
 
-def judged(seen: History, stopped: str = "") -> StabilityRating:
-    return rate_stability(stopped, still_hops(seen, 0.08, 2e-3), float(seen.deviation_pa()[-1]))
+def judged(seen: History, stopped: str = "", off: float = 0.0) -> StabilityRating:
+    hops = still_hops(seen, 0.08, 2e-3)
+    return rate_stability(stopped, hops, float(seen.deviation_pa()[-1]), off)
 
 
 def test_verdicts_follow_the_numbers_of_the_text():
@@ -44,6 +45,9 @@ def test_verdicts_follow_the_numbers_of_the_text():
     assert quiet.deviation_pa(4.0) == pytest.approx([0.0] * 3, abs=1e-9)
     assert judged(quiet) is StabilityRating.EXCELLENT
     assert judged(loud) is StabilityRating.GOOD
+    assert judged(quiet, off=-0.021) is StabilityRating.BIASED
+    assert judged(quiet, off=0.019) is StabilityRating.EXCELLENT
+    assert judged(loud, off=0.1) is StabilityRating.GOOD
     assert judged(history(10.0, 0.0861)) is StabilityRating.GOOD  # a particle left the surface
     assert judged(quiet, "the flow diverged") is StabilityRating.FAILED
 

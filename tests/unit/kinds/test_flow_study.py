@@ -20,6 +20,7 @@ from sandmould.casting.mps.stability_measures import StabilityRating, by_window,
 from sandmould.drawing.animation import ABSENT
 from sandmould.drawing.flow_film import make_flow_film
 from sandmould.execution.simulate import export_run, measure_run, render_run, simulate
+from sandmould.kinds.flow.planning import FlowPlanning
 from sandmould.report.flow_charts import _parts, condition_text, said_of, stability_map
 from sandmould.report.kinds.flow import _hopping
 from sandmould.report.page import write_report
@@ -100,6 +101,31 @@ def test_a_range_of_a_whole_number_is_swept_in_whole_numbers(tmp_path: Path) -> 
         open_study(opened(tmp_path, {"sweep": sweep}))
 
 
+def plan_notes(scenario: dict[str, Any]) -> dict[str, str]:
+    """What the plan tells of a flow, by what it is about."""
+    return {it.about: it.text for it in FlowPlanning().notes(MetalFlow(**scenario))}
+
+
+def test_the_plan_says_what_lies_beyond_the_map_of_stability() -> None:
+    mapped = {"case": {"kind": "tank"}, "dt_max_s": 0.001}
+    assert plan_notes(mapped) == {}
+    shallow = mapped | {"case": {"kind": "tank", "depth_m": 0.016}, "relaxations": 20}
+    assert plan_notes(shallow)["Map"].startswith("relaxations, case.depth_m lie beyond the map")
+    thick = mapped | {"metal": {"viscosity_m2_s": 1e-3}}
+    assert plan_notes(thick)["Map"].startswith("metal.viscosity_m2_s lies beyond")
+
+
+def test_a_casting_with_a_shoulder_says_its_mass_and_that_it_moves() -> None:
+    def poured(size_m: float) -> dict[str, str]:
+        return plan_notes({"case": {"kind": "shoulder", "particle_m": size_m}})
+
+    # counted beside a drawing of 158 cm3: -9.4 to +9.4 %
+    assert poured(0.006)["Mass"] == "the particles hold 9.4 % less metal than the drawn casting."
+    assert poured(0.0035)["Mass"] == "the particles hold 9.4 % more metal than the drawn casting."
+    assert "It lost a third of each swing" in poured(0.005)["Moving"]
+    assert "Collisions" in poured(0.005)
+
+
 def as_printed(scenario: MetalFlow) -> Scheme:
     """The gradient as the paper prints it, with which every run fails."""
     return replace(SCHEME_OF(scenario), gradient="printed")
@@ -135,7 +161,8 @@ def test_a_study_is_computed_collected_and_reported(
     summary = pd.read_csv(folder / "summary.tsv", sep="\t")
     # a tank is run to see whether its setting holds: that it does not is an answer
     assert summary["outcome"].tolist() == ["finished"] * 2
-    assert summary["classification"].tolist() == ["excellent", "failed"]
+    # 16 particles deep the mean is 3 % off
+    assert summary["classification"].tolist() == ["biased", "failed"]
     held, failed = summary.to_dict("records")
     # 28 mm of metal, 686 Pa; half a particle at the top, 49 Pa, carries no pressure and as much
     # again is lost to settling
@@ -157,8 +184,8 @@ def test_a_study_is_computed_collected_and_reported(
     first = page[page.index('<p class="first">') : page.index("</p>", page.index('class="first"'))]
     assert "The pressure stays calm at 1 of 2 settings, calmest at " in first
     assert first.endswith(" 1 of 2 runs broke down.")
-    assert "Pour with the calm setting" in page
-    assert "1 excellent, 0 good and 1 failed" in page
+    assert "Take smaller particles" in page
+    assert "0 excellent, 1 biased, 0 good and 1 failed" in page
     assert page.count('class="flow-film"') == 2
     assert failed["detail"][:40] in page
     # no map: neither time step nor relaxations are swept
@@ -218,12 +245,14 @@ def table(pressure_pa: list[float], rise_m_s: float = 0.0, top_m: float = 0.033)
 
 def test_runs_are_judged_from_when_they_are_measured() -> None:
     scenario = MetalFlow(**(SMALL | {"duration_s": 9.0, "measured_from_s": 2.0}))
-    # 5000 Pa while it settled, then 700 plus and minus 100
-    found = measure_flow(scenario, table([5000.0, 5000.0, 800.0, 600.0, 800.0, 600.0]), "")
-    assert found.mean_pa["h28"] == pytest.approx(700.0)
+    # 5000 Pa while it settled, then 690 plus and minus 100
+    found = measure_flow(scenario, table([5000.0, 5000.0, 790.0, 590.0, 790.0, 590.0]), "")
+    assert found.mean_pa["h28"] == pytest.approx(690.0)
     assert found.sd_pa["h28"] == pytest.approx(100.0)
     assert found.ideal_pa == pytest.approx({"h12": 294.0, "h20": 490.0, "h28": 686.0})
     assert found.verdict is StabilityRating.EXCELLENT
+    low = measure_flow(scenario, table([0.0, 0.0, *[650.0] * 4]), "")
+    assert low.verdict is StabilityRating.BIASED
     loud = measure_flow(scenario, table([0.0, 0.0, 950.0, 500.0, 950.0, 500.0]), "")
     assert loud.verdict is StabilityRating.GOOD
     hops = measure_flow(scenario, table([700.0] * 6, top_m=0.045), "")

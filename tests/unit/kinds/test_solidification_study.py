@@ -97,6 +97,8 @@ BAR = SMALL["shapes"][0]
             {"probes": [{"name": "far", "at_m": [0.1, 0.0]}]},
             r"scenario.probes.0.at_m = \[0.1, 0.0\] .* a point in the box",
         ),
+        ({"risers": [1]}, r"risers.0 = 1 .* at most 0, a shape"),
+        ({"read_at_solid_fraction": 1.0}, "read_at_solid_fraction = 1.0 .* less than 1"),
         ({"probes": [*SMALL["probes"]] * 2}, "scenario.probes.1.name = 'middle' .* each name once"),
         ({"initial_k": {"casting": 1500.0}}, r"initial_k.casting = 1500.0 .* cast steel, 1713 K"),
         ({"mould": {"density_kg_m3": -1.0}}, r"scenario.mould.density_kg_m3 = -1.0"),
@@ -169,6 +171,9 @@ def test_a_study_is_computed_collected_and_reported(tmp_path: Path) -> None:
         measure_run(of_run)
         export_run(of_run)
         assert (of_run / "final.png").stat().st_size > 5000
+        degc = pd.read_csv(of_run / "cooling_curves.csv")["middle_degc"]
+        series = pd.read_csv(of_run / "series.tsv", sep="\t")
+        np.testing.assert_allclose(degc, series["middle_k"] - 273.15, atol=0.01)
     collect(folder)
     summary = pd.read_csv(folder / "summary.tsv", sep="\t")
     assert summary["elements"].tolist() == [64, 256]
@@ -191,7 +196,9 @@ def test_a_study_is_computed_collected_and_reported(tmp_path: Path) -> None:
         or "No setting comes within" in page
     )
     assert "All settings against element 5 mm, exchange difference" in page
-    assert "The casting is solid after" in page
+    assert "Last: the casting is solid after" in page
+    assert "no shape is named as a riser, so nothing feeds that place" in page
+    assert "Temperature at the probes of run" in page
     assert "Cooling curves" in page
     assert "Placeholder values" in page
     assert "casting solidus" in page
@@ -215,6 +222,25 @@ def measured(folder: Path, **scenario: Any) -> Path:
     of_run = one_run(folder, **scenario)
     measure_run(of_run)
     return of_run
+
+
+def test_a_short_riser_leaves_a_plate_without_feed(tmp_path: Path) -> None:
+    def shape(*corners: float) -> dict[str, Any]:
+        return {"kind": "rectangle", "low_m": [*corners[:2]], "high_m": [*corners[2:]]}
+
+    plate, neck = shape(0.01, 0.02, 0.03, 0.05), shape(0.03, 0.03, 0.04, 0.035)
+    riser = shape(0.04, 0.02, 0.05, 0.05)
+    folder = measured(tmp_path, shapes=[plate, neck, riser], risers=[2], element_m=0.0025,
+                      record_s=1.0)  # fmt: skip
+    fields = np.load(folder / "fields.npz")
+    assert fields["volume_m3"][fields["riser"]].sum() == pytest.approx(300e-6)
+    last = pd.read_csv(folder / "measures.tsv", sep="\t").iloc[-1]
+    # of 600 mm2 of plate and 50 of neck nearly all, when the neck closes
+    assert 0.5 < last["cut_off_fraction"] < 1.0
+    assert 0.0 < last["low_niyama_fraction"] < 0.5
+    # a plate 20 mm thick and 30 mm high in sand is no thicker than one of 20 mm without end
+    assert 0.004 < np.nanmax(fields["modulus_m"]) < 0.0102
+    assert "cut_off_fraction" in (folder / "measures.tsv").read_text()
 
 
 def test_a_run_that_ends_liquid_says_so(tmp_path: Path) -> None:

@@ -106,9 +106,9 @@ def run_still(
     history = watch.history()
     # a run that a guard stops at once has no history
     deviation_pa = math.nan if stopped else float(history.deviation_pa()[-1])
-    verdict = rate_stability(
-        stopped, still_hops(history, ROWS * SPACING_M, SPACING_M), deviation_pa
-    )
+    off = math.nan if stopped else float(history.mean_pa()[-1] / ideal_pa()[-1]) - 1.0
+    hops = still_hops(history, ROWS * SPACING_M, SPACING_M)
+    verdict = rate_stability(stopped, hops, deviation_pa, off)
     return Still(scheme, verdict, stopped, history, flow.cost)
 
 
