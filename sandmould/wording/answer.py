@@ -286,7 +286,12 @@ class AnswerWords:
     @property
     def stand_in_sections(self) -> str:
         """What the placeholder values belong to."""
-        return listed(sorted({key.partition(".")[0] for key in self.answer.stand_ins}))
+        return listed(sorted({self._section(key) for key in self.answer.stand_ins}))
+
+    @staticmethod
+    def _section(key: str) -> str:
+        section = key.partition(".")[0]
+        return "temperatures at the beginning" if section == "initial_k" else section
 
     @property
     def stand_in_of(self) -> str:

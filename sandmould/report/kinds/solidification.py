@@ -46,6 +46,7 @@ from sandmould.statistics.answer import Answer
 from sandmould.statistics.refining import resolution_among
 from sandmould.statistics.verdict import rank_runs
 from sandmould.study.collect import Collected
+from sandmould.wording.answer import AnswerWords
 from sandmould.wording.next_steps import NextStep
 
 NEAR_PERCENT = 5.0
@@ -92,6 +93,8 @@ def _pages(findings: Findings[Solidification], film_budget_bytes: int) -> KindPa
     fields, first, said, tables, fed = _fields(folder, scenario)
     errors = _errors(reference, scenario, collected) if reference else []
     error_cost = _error_charts(errors)
+    cheapest = "" if study.seeks_best else _cheapest(errors, reference, collected)
+    is_one = len(said) > 1 and not keys and not study.seeks_best
     stand_ins = _stand_ins(findings.answer.stand_ins)
     shown = {
         "pictured_run": run,
@@ -117,8 +120,8 @@ def _pages(findings: Findings[Solidification], film_budget_bytes: int) -> KindPa
             **curve_figures([*([cooling] if cooling else []), *curves]),
         },
         picture=first,
-        findings=said,
-        answer="" if study.seeks_best else _cheapest(errors, reference, collected),
+        findings=said[2:] if is_one else said,
+        answer=_of_one(findings, said[:2]) if is_one else cheapest,
         grounds=notes(
             "casting_grounds.j2",
             has_stand_ins=bool(stand_ins),
@@ -126,6 +129,12 @@ def _pages(findings: Findings[Solidification], film_budget_bytes: int) -> KindPa
         ),
         steps=() if resolution_among(keys) and not reference else _steps(scenario, bool(reference)),
     )
+
+
+def _of_one(findings: Findings[Solidification], said: Sequence[str]) -> str:
+    """The answer of a study of one run, from what is said of it under names."""
+    texts = [text.partition(": ")[2] for text in said]
+    return worded("cast_answer.j2", it=AnswerWords(findings.answer), said=texts)
 
 
 def _steps(scenario: Solidification, has_reference: bool) -> tuple[NextStep, ...]:
@@ -348,6 +357,7 @@ def _errors(point: Point, scenario: Solidification, collected: Collected) -> lis
 
 def _cheapest(errors: Sequence[_Error], reference: Point, collected: Collected) -> str:
     """The cheapest setting that is near the reference; empty where there is none to compare."""
+    errors = [e for e in errors if math.isfinite(e.time_percent)]
     if not errors:
         return ""
     near = [e for e in errors if abs(e.time_percent) <= NEAR_PERCENT]
