@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.sparse import csr_array
 
 from sandmould.pattern_fe.contact import touch
 from sandmould.pattern_fe.coupling.body import StaticSolution
@@ -38,6 +39,8 @@ class FoamBody:
         self._large = large
         self._surface = pattern.surface.outer
         self._motion = self._surface.motion
+        self._to_nodes = csr_array(self._motion.T)
+        """Of loads on the surface; made once, for it is asked for in every pass of the loop."""
         self._surroundings = surroundings
         self._compliance: dict[int, Array] = {}
         """Displacements of the surface under 1 N on a component of it, by its number."""
@@ -49,15 +52,19 @@ class FoamBody:
 
     def solve(self, load_n: Array) -> StaticSolution:
         """Find the pattern at rest under loads on the outer surface, (nv, d) float64, N."""
-        pattern, load = self._pattern, self._motion.T @ load_n
+        pattern, load = self._pattern, self._to_nodes @ load_n
         if self._large:
             moved, contact_n = pattern.solve_large(load, self._surroundings)
         else:
             moved, contact_n = self._linear(load)
-        reaction = self._inner_force_n(moved) - load
-        touched = self._motion.T @ contact_n != 0.0
-        reaction[~(pattern.fixed | touched).any(axis=1)] = 0.0
-        reaction += pattern.bedding_force_n(moved)
+        inner = self._inner_force_n(moved)
+        energy_j = pattern.energy_j(moved, True) if self._large else 0.5 * np.vdot(inner, moved)
+        held = pattern.fixed.any(axis=1)
+        if contact_n.any():
+            held |= (self._to_nodes @ contact_n).any(axis=1)
+        reaction = np.where(held[:, None], inner - load, 0.0)
+        if pattern.supports.bedding_n_m3:
+            reaction += pattern.bedding_force_n(moved)
         # Small displacements balance on the drawing, large ones where the nodes have come to.
         place_m = pattern.space.node_m + (moved if self._large else 0.0)
         outer = load + reaction
@@ -65,7 +72,7 @@ class FoamBody:
         return StaticSolution(
             self._motion @ moved,
             moved,
-            pattern.energy_j(moved, self._large),
+            float(energy_j),
             np.asarray(reaction.sum(axis=0)),
             float(np.linalg.norm(moment)),
             contact_n if contact_n.any() else None,
@@ -93,7 +100,7 @@ class FoamBody:
                 break
         if contact is None:
             return moved, np.zeros_like(at_m)
-        return pattern.solve_linear(load + self._motion.T @ contact.load_n), contact.load_n
+        return pattern.solve_linear(load + self._to_nodes @ contact.load_n), contact.load_n
 
     def _response(self, load_n: Array) -> Array:
         """Displacements of the surface under loads on it, (nv d, m); those of one load are kept."""
@@ -101,7 +108,7 @@ class FoamBody:
             if entry not in self._compliance:
                 unit = np.zeros_like(self.vertices_m)
                 unit.ravel()[entry] = 1.0
-                moved = self._pattern.solve_linear(self._motion.T @ unit)
+                moved = self._pattern.solve_linear(self._to_nodes @ unit)
                 self._compliance[int(entry)] = (self._motion @ moved).ravel()
         used = np.flatnonzero(load_n.any(axis=1))
         if not len(used):

@@ -34,6 +34,9 @@ from sandmould.runs.outcome import Outcome
 from sandmould.scenario.pattern import Loop
 
 Array = NDArray[np.float64]
+GOES_ON = 0.7
+"""Part of the way of the last window that the first iteration of the next one adds, where windows
+are iterated: a surface that moves evenly is met sooner, and below 1 it comes to rest."""
 GAIN_EVERY_S = 0.02
 """About how often the gain is measured, at checks: it costs two windows."""
 
@@ -174,7 +177,7 @@ class CoupledSession(PatternSession):
         start, displacement, iterations = self._interface, self._next, 0
         self._solve_s = 0.0
         self._relaxation.begin_window(loop.most_passes > 1)
-        nearest: tuple[_Iteration, Any] | None = None
+        nearest: _Iteration | None = None
         while True:
             iteration = self._iterate(displacement, steps * self.sand.step_s)
             iterations += 1
@@ -184,18 +187,21 @@ class CoupledSession(PatternSession):
             ahead = iteration.next_m
             if iteration.residual_m <= tolerance * rms_m(displacement):
                 break
-            least_m = np.inf if nearest is None else nearest[0].residual_m
+            least_m = np.inf if nearest is None else nearest.residual_m
             if iterations == loop.most_passes:
                 if nearest is not None and iteration.residual_m > STRUCK * least_m:
-                    iteration, end = nearest
-                    self.sand.restore_checkpoint(end)
+                    iteration = nearest
+                    self.sand.restore_checkpoint(checkpoint)
+                    self._sand_load(iteration.displacement_m, steps * self.sand.step_s)
                     self._solved = iteration.solution.displacement_m
                 break
             if self._relaxation.keeps_nearest and iteration.residual_m < least_m:
-                nearest = iteration, self.sand.save_checkpoint()
+                nearest = iteration
             self.sand.restore_checkpoint(checkpoint)
             displacement = ahead
         self._take(start, steps, iteration)
+        if checkpoint is not None and self._relaxation.keeps_nearest:
+            ahead = self._outside(ahead + GOES_ON * (self._interface - start))
         self._next = ahead
         self._write(steps, iterations, iteration)
         self._check()
@@ -213,10 +219,7 @@ class CoupledSession(PatternSession):
 
     def _iterate(self, displacement: Array, window_s: float) -> _Iteration | None:
         """Move the interface through a window, and solve the pattern; None without a load."""
-        sand = self.sand
-        sand.move_surface(self._surface, self._body.vertices_m + displacement, window_s)
-        sand.advance(window_s)
-        load = sand.vertex_loads(self._surface)
+        sand, load = self.sand, self._sand_load(displacement, window_s)
         if load is None:
             return None
         begun = time.perf_counter()
@@ -229,6 +232,12 @@ class CoupledSession(PatternSession):
         self._solve_s += time.perf_counter() - begun
         next_m = self._outside(relaxed.reshape(displacement.shape))
         return _Iteration(displacement, load, solution, next_m)
+
+    def _sand_load(self, displacement: Array, window_s: float) -> Array | None:
+        """Mean load of the sand on the vertices while the interface moves through a window, N."""
+        self.sand.move_surface(self._surface, self._body.vertices_m + displacement, window_s)
+        self.sand.advance(window_s)
+        return self.sand.vertex_loads(self._surface)
 
     def _outside(self, displacement: Array) -> Array:
         """A displacement that enters nothing: steps beyond the solution may lead into a wall."""

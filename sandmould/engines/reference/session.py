@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import copy
 from collections.abc import Mapping
 from dataclasses import replace
 from pathlib import Path
@@ -11,6 +10,7 @@ from typing import Any
 import numpy as np
 
 from sandmould.dem import source_hash
+from sandmould.dem.moving_state import copied
 from sandmould.dem.solver import NotANumberError
 from sandmould.dem.table import MountedTable
 from sandmould.engines.box_motion import displacements, start_of_grains
@@ -243,16 +243,21 @@ class ReferenceSession(StagedSession):
         self.solver.attach_mover(name, mover)
 
     def save_checkpoint(self) -> Any:
-        """Copies of the solver's arrays, loads of this check, where the stage stands."""
-        loads = self.solver.moving.walls.loads.sum(axis=0)
-        state = copy.deepcopy(self.solver.state())
-        return state, loads, dict(self._loads), self._periods.steps, self._stage_state()
+        """Copies of the solver's arrays with its lists, loads, where the stage stands."""
+        solver, periods = self.solver, self._periods.steps
+        moving = copied(solver.moving)
+        loads = moving.walls.loads
+        loads[0], loads[1:] = loads.sum(axis=0), 0.0
+        table = solver.steps, solver.table_places_m, periods
+        return moving, table, dict(self._loads), self._stage_state()
 
     def restore_checkpoint(self, checkpoint: Any) -> None:
         """Compute on from what ``save_checkpoint`` gave."""
-        arrays, loads, means, self._periods.steps, stage = checkpoint
-        self.solver.restore(copy.deepcopy(arrays))
-        self.solver.moving.walls.loads[0] = loads
+        solver = self.solver
+        moving, table, means, stage = checkpoint
+        solver.moving = copied(moving)
+        solver.surfaces.arrays = solver.moving.walls.arrays
+        solver.steps, solver.table_places_m, self._periods.steps = table
         self._loads = dict(means)
         self._restore_stage(stage)
 
