@@ -13,7 +13,6 @@ from scipy.sparse.linalg import SuperLU
 
 from sandmould.geometry.geometry import Scene
 from sandmould.pattern_fe import dynamics
-from sandmould.pattern_fe.checks import check_mesh
 from sandmould.pattern_fe.condensation import CondensedSurface, condensed_surface
 from sandmould.pattern_fe.elasticity import (
     displacement_gradient,
@@ -65,7 +64,6 @@ class Pattern:
         order: int = 2,
         thickness_m: float | None = None,
     ) -> None:
-        check_mesh(mesh)
         self.foam = foam or Foam()
         self.supports = supports
         self.space = space_of(mesh, order, thickness_m)
@@ -98,7 +96,7 @@ class Pattern:
 
     @cached_property
     def _factor(self) -> SuperLU:
-        check_held(self.space.node_m, self.fixed, self.supports)
+        check_held(self.space, self.fixed, self.supports)
         return factorised(self.stiffness[self._free][:, self._free])
 
     @property
@@ -109,7 +107,7 @@ class Pattern:
     @cached_property
     def _loose_motions(self) -> int:
         bedded = self.supports.bedding_n_m3 > 0.0
-        return 0 if bedded else len(loose_motions(self.space.node_m, self.fixed))
+        return 0 if bedded else len(loose_motions(self.space, self.fixed))
 
     @property
     def is_free(self) -> bool:
@@ -153,7 +151,7 @@ class Pattern:
     ) -> tuple[Array, Array]:
         """Large displacements under dead loads, and reactions of obstacles; see ``solve_large``."""
         self._check_load(load_n)
-        check_held(self.space.node_m, self.fixed, self.supports)
+        check_held(self.space, self.fixed, self.supports)
         return solve_large(
             self.space,
             self.foam,

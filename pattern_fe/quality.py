@@ -49,10 +49,15 @@ def mesh_sentence(scenario: Scenario, pattern: Pattern) -> str:
     """Elements, unknowns, volume and quality of the mesh of a drawn pattern."""
     config = scenario.pattern
     assert config is not None
-    assert isinstance(config.shape, PatternDrawing)
-    mesh = pattern.space.mesh
+    mesh, space = pattern.space.mesh, pattern.space
     quality = tetrahedron_quality(mesh)
-    drawn = TriangleMesh("pattern", *drawn_surface(config.shape, "pattern.shape"))
+    of_body = np.bincount(space.body_of_node[space.cells[:, 0]], weights=space.weight.sum(axis=1))
+    volumes = [
+        (volume_m3, TriangleMesh("pattern", *drawn_surface(body.shape, "pattern.shape")).measure)
+        for body, volume_m3 in zip(config.bodies, of_body, strict=True)
+        if isinstance(body.shape, PatternDrawing)
+    ]
+    held_m3, drawn_m3 = np.sum(volumes, axis=0)
     poor = int((quality < POOR).sum())
     warning = (
         f" {poor} are flatter than {number(POOR)}: another pattern.element_m may do better."
@@ -62,7 +67,7 @@ def mesh_sentence(scenario: Scenario, pattern: Pattern) -> str:
     return (
         f"The pattern's mesh has {mesh.nelements:,} tetrahedra of {number(1e3 * config.element_m)} "
         f"mm, {pattern.space.node_m.size:,} unknowns and {len(pattern.surface.vertices_m):,} "
-        f"vertices that sand meets; it holds {pattern.space.weight.sum() / drawn.measure:.1%} of "
+        f"vertices that sand meets; it holds {held_m3 / drawn_m3:.1%} of "
         "the drawing's volume. Quality of its elements, 1 where regular: "
         f"{number(quality.mean(), 2)} in the mean, {number(quality.min(), 2)} at worst.{warning}"
     )

@@ -16,11 +16,11 @@ from threadpoolctl import threadpool_limits
 from sandmould.bad_input import BadInputError, Problem
 from sandmould.geometry.mesh import TriangleMesh
 from sandmould.limits import PATTERN_ELEMENTS, SOLID_EQUATIONS
-from sandmould.pattern_fe.checks import check_inside
+from sandmould.pattern_fe.checks import check_inside, check_mesh
 from sandmould.pattern_fe.material import Foam
 from sandmould.pattern_fe.mesh_file import read_mesh
 from sandmould.pattern_fe.pattern import Pattern
-from sandmould.pattern_fe.shapes import bar, l_shape, mesh_of
+from sandmould.pattern_fe.shapes import bar, l_shape, mesh_of, name_of, side_by_side
 from sandmould.pattern_fe.supports import Supports
 from sandmould.pattern_fe.surroundings import Surroundings
 from sandmould.pattern_fe.volume_mesh import drawing_mesh
@@ -42,19 +42,25 @@ def pattern_of(scenario: Scenario) -> Pattern:
     config = scenario.pattern
     assert config is not None
     box, d = scenario.box, scenario.dimension
-    if len(config.position_m) != d:
-        valid = f"{d} numbers, one a dimension"
-        raise BadInputError([Problem("pattern.position_m", list(config.position_m), valid)])
-    has_depth = isinstance(config.shape, MeshFile | PatternDrawing)
-    if config.depth_m is not None and (d == 2 or has_depth):
-        valid = "null in 2D and for a file, which has its own"
-        raise BadInputError([Problem("pattern.depth_m", config.depth_m, valid)])
-    _check_elements(config, box.depth_m if d == 3 else None)
+    for body, key in zip(config.bodies, _keys(config), strict=True):
+        if len(body.position_m) != d:
+            valid = f"{d} numbers, one a dimension"
+            raise BadInputError([Problem(f"{key}.position_m", list(body.position_m), valid)])
+        has_depth = isinstance(body.shape, MeshFile | PatternDrawing)
+        if body.depth_m is not None and (d == 2 or has_depth):
+            valid = "null in 2D and for a file, which has its own"
+            raise BadInputError([Problem(f"{key}.depth_m", body.depth_m, valid)])
+        _check_elements(body, box.depth_m if d == 3 else None)
     # what is shared by all runs of a study that differ in their sand or their loop
-    body = config.model_copy(update={"loop": Loop()})
+    alike = config.model_copy(update={"loop": Loop()})
     size_m = (box.width_m, box.height_m) if d == 2 else (box.width_m, box.depth_m, box.height_m)
     thickness_m = scenario.sand.thickness_m if d == 2 else None
-    return _computed(body, size_m, thickness_m, _changed_ns(config))
+    return _computed(alike, size_m, thickness_m, tuple(map(_changed_ns, config.bodies)))
+
+
+def _keys(config: PatternConfig) -> list[str]:
+    """Where a scenario tells the bodies of a cluster."""
+    return ["pattern", *(f"pattern.others.{n}" for n in range(len(config.others or ())))]
 
 
 def _check_elements(config: PatternConfig, box_depth_m: float | None) -> None:
@@ -87,27 +93,34 @@ def _changed_ns(config: PatternConfig) -> int:
 
 @lru_cache(maxsize=8)
 def _computed(
-    config: PatternConfig, size_m: tuple[float, ...], thickness_m: float | None, changed_ns: int
+    config: PatternConfig,
+    size_m: tuple[float, ...],
+    thickness_m: float | None,
+    changed_ns: tuple[int, ...],
 ) -> Pattern:
     """The pattern of a section in a box; its matrices stay with it."""
-    shape = config.shape
-    named = shape.file if isinstance(shape, MeshFile | PatternDrawing) else shape.model_dump()
-    with _blaming("pattern.shape", named):
-        mesh = _mesh(config, size_m).translated(np.array(config.position_m))
-    with _blaming("pattern.position_m", list(config.position_m)):
-        check_inside(mesh.p.T, np.zeros(len(size_m)), np.array(size_m))
-    if isinstance(mesh, MeshHex):
-        # of each element its own nodes; those of the surface come to them
-        equations = 3 * config.order**3 * mesh.nelements
-        asked: tuple[str, Any] = ("pattern.element_m", config.element_m)
-        if isinstance(config.shape, MeshFile):
-            asked = ("pattern.shape.file", config.shape.file)
-        SOLID_EQUATIONS.check(asked[0], equations, asked[1])
+    _refuse_cluster(config, len(size_m))
+    meshes, equations = [], 0
+    for body, key in zip(config.bodies, _keys(config), strict=True):
+        shape = body.shape
+        named = shape.file if isinstance(shape, MeshFile | PatternDrawing) else shape.model_dump()
+        with _blaming(f"{key}.shape", named):
+            meshes.append(_mesh(body, size_m).translated(np.array(body.position_m)))
+            check_mesh(meshes[-1])
+        with _blaming(f"{key}.position_m", list(body.position_m)):
+            check_inside(meshes[-1].p.T, np.zeros(len(size_m)), np.array(size_m))
+        if isinstance(meshes[-1], MeshHex):
+            # of each element its own nodes; those of the surface come to them
+            equations += 3 * config.order**3 * meshes[-1].nelements
+            asked: tuple[str, Any] = ("pattern.element_m", config.element_m)
+            if isinstance(shape, MeshFile):
+                asked = (f"{key}.shape.file", shape.file)
+            SOLID_EQUATIONS.check(asked[0], equations, asked[1])
+    with _blaming("pattern.others", f"{len(meshes) - 1} patterns"):
+        mesh = side_by_side(meshes)
     # Threads of small matrices wait for one another, longest beside other runs.
-    with (
-        threadpool_limits(1),
-        _blaming("pattern.supports", config.supports.model_dump(mode="json")),
-    ):
+    held = [body.supports.model_dump(mode="json", exclude_none=True) for body in config.bodies]
+    with threadpool_limits(1), _blaming("pattern.supports", held if config.others else held[0]):
         pattern = Pattern(
             mesh,
             _supports(config),
@@ -120,6 +133,17 @@ def _computed(
     return pattern
 
 
+def _refuse_cluster(config: PatternConfig, dimension: int) -> None:
+    """Refuse further patterns where there is room for one alone."""
+    valid = ""
+    if dimension == 2:
+        valid = "absent in 2D, where sand meets one outline; a scene in 3D holds several patterns"
+    elif any(body.supports.free or body.supports.bedding_n_m3 for body in config.bodies):
+        valid = "absent beside supports.free or bedding_n_m3; clamped, resting and hung hold each"
+    if config.others and valid:
+        raise BadInputError([Problem("pattern.others", f"{len(config.others)} patterns", valid)])
+
+
 def _supports(config: PatternConfig) -> Supports:
     """What holds the pattern; a ValueError where a free one is held by something else too."""
     given = config.supports
@@ -127,8 +151,14 @@ def _supports(config: PatternConfig) -> Supports:
     if given.free and held:
         others = "clamped, resting, hung and bedding_n_m3"
         raise ValueError(f"a free pattern is held by sand alone, valid is without {others}")
-    hung = tuple((box.low_m, box.high_m) for box in given.hung or ())
-    return Supports(given.clamped, given.resting, given.bedding_n_m3 or 0.0, hung)
+    of_all = [body.supports for body in config.bodies]
+    named = list(enumerate(of_all))
+    return Supports(
+        tuple(name_of(side, n) for n, supports in named for side in supports.clamped),
+        tuple(name_of(side, n) for n, supports in named for side in supports.resting),
+        given.bedding_n_m3 or 0.0,
+        tuple((box.low_m, box.high_m) for supports in of_all for box in supports.hung or ()),
+    )
 
 
 def _mesh(config: PatternConfig, size_m: tuple[float, ...]) -> Any:

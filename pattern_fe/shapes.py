@@ -106,3 +106,39 @@ def with_sides(mesh: Any) -> Any:
     return mesh.with_boundaries(
         {name: facets for name, facets in sides.items() if name not in named and len(facets)}
     )
+
+
+def name_of(boundary: str, body: int) -> str:
+    """Name of a boundary of one of several bodies, counted from 0; the first keep theirs."""
+    return f"{boundary} of pattern.others.{body - 1}" if body else boundary
+
+
+def side_by_side(meshes: Sequence[Any]) -> Any:
+    """Bodies that share nothing as one mesh, with their boundaries.
+
+    Raises
+    ------
+    ValueError
+        When they are not made of the same elements.
+    """
+    first, *others = meshes
+    if not others:
+        return first
+    unlike = {type(mesh).__name__ for mesh in others} - {type(first).__name__}
+    if unlike:
+        valid = f"the elements of the first one, {type(first).__name__}"
+        raise ValueError(f"it has a {unlike.pop()}; in one box valid are {valid}")
+    corners = np.cumsum([0, *(mesh.nvertices for mesh in meshes)])
+    # faces are numbered by their corners, so those of one body come after those of another
+    faces = np.cumsum([0, *(mesh.nfacets for mesh in meshes)])
+    whole = type(first)(
+        np.hstack([mesh.p for mesh in meshes]),
+        np.hstack([mesh.t + start for mesh, start in zip(meshes, corners[:-1], strict=True)]),
+    )
+    return whole.with_boundaries(
+        {
+            name_of(name, number): np.asarray(of_body) + faces[number]
+            for number, mesh in enumerate(meshes)
+            for name, of_body in mesh.boundaries.items()
+        }
+    )

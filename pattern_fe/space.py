@@ -3,11 +3,13 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import cached_property
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 from scipy.sparse import coo_array, csc_array
+from scipy.sparse.csgraph import connected_components
 from skfem import (
     Basis,
     ElementHex1,
@@ -69,6 +71,14 @@ class Space:
         """Mesh whose corners are the nodes in their order, in second order one twice as fine."""
         bare = type(self.mesh)(self.mesh.p, self.mesh.t)
         return bare if self.order == 1 else bare.refined()
+
+    @cached_property
+    def body_of_node(self) -> Indices:
+        """Which of its bodies each node is of, (n,) int64: bodies share no node."""
+        first, others = np.broadcast_arrays(self.cells[:, :1], self.cells[:, 1:])
+        links = (np.ones(others.size), (first.ravel(), others.ravel()))
+        found = connected_components(coo_array(links, shape=(len(self.node_m),) * 2), False)
+        return np.asarray(found[1], dtype=np.int64)
 
     def basis(self, integrated_degree: int) -> Any:
         """Scalar basis of scikit-fem whose degrees of freedom are the nodes."""

@@ -110,16 +110,18 @@ def rigid_motions(node_m: Array) -> Array:
     return np.stack([m.ravel() for m in motions], axis=1)
 
 
-def loose_motions(node_m: Array, fixed: Mask) -> list[str]:
-    """Rigid motions that supports leave, each named by its largest part.
+def loose_motions(space: Space, fixed: Mask) -> list[str]:
+    """Rigid motions that supports leave its bodies, each named by its largest part.
 
-    They are the null space of what the supports see of all rigid motions.
-
-    Parameters
-    ----------
-    node_m : (n, d) float64, m
-    fixed : (n, d) bool
+    ``fixed``: (n, d) bool.
     """
+    bodies = space.body_of_node
+    each = [bodies == number for number in range(bodies.max() + 1)]
+    return [loose for body in each for loose in _loose_of_body(space.node_m[body], fixed[body])]
+
+
+def _loose_of_body(node_m: Array, fixed: Mask) -> list[str]:
+    """The null space of what the supports of a body see of all its rigid motions."""
     d = node_m.shape[1]
     names = [f"shift along {AXES[i]}" for i in range(d)]
     names += ["turn"] if d == 2 else [f"turn about {axis}" for axis in AXES]
@@ -131,7 +133,7 @@ def loose_motions(node_m: Array, fixed: Mask) -> list[str]:
     return [names[int(np.abs(row).argmax())] for row in loose]
 
 
-def check_held(node_m: Array, fixed: Mask, supports: Supports) -> None:
+def check_held(space: Space, fixed: Mask, supports: Supports) -> None:
     """Refuse statics of a pattern that can move without deforming.
 
     Raises
@@ -140,7 +142,7 @@ def check_held(node_m: Array, fixed: Mask, supports: Supports) -> None:
     """
     if supports.bedding_n_m3 > 0.0:
         return
-    loose = loose_motions(node_m, fixed)
+    loose = loose_motions(space, fixed)
     if not loose:
         return
     held = (

@@ -59,9 +59,7 @@ class FoamBody:
             moved, contact_n = self._linear(load)
         inner = self._inner_force_n(moved)
         energy_j = pattern.energy_j(moved, True) if self._large else 0.5 * np.vdot(inner, moved)
-        held = pattern.fixed.any(axis=1)
-        if contact_n.any():
-            held |= (self._to_nodes @ contact_n).any(axis=1)
+        held = np.asarray((pattern.fixed | (self._to_nodes @ contact_n != 0.0)).any(axis=1))
         reaction = np.where(held[:, None], inner - load, 0.0)
         if pattern.supports.bedding_n_m3:
             reaction += pattern.bedding_force_n(moved)

@@ -8,6 +8,8 @@ from __future__ import annotations
 import numpy as np
 
 from sandmould.bad_input import BadInputError, Problem
+from sandmould.geometry.geometry import Scene
+from sandmould.geometry.mesh import TriangleMesh
 from sandmould.pattern_fe.coupling.schemes import refuse_scheme
 from sandmould.pattern_fe.pattern import Pattern
 from sandmould.pattern_fe.scene import pattern_of, surroundings_of
@@ -66,6 +68,7 @@ def refuse_place(scenario: Scenario, pattern: Pattern) -> None:
         if isinstance(shape, MeshFile):
             raise BadInputError([Problem("pattern.shape.unit_m", shape.unit_m, valid)])
         raise BadInputError([Problem("pattern.shape", shape.model_dump(mode="json"), valid)])
+    _refuse_overlap(scenario)
     unsound = [p for p in problems(scenario) if p.key.startswith("obstacles")]
     if unsound:
         raise BadInputError(unsound)
@@ -73,3 +76,20 @@ def refuse_place(scenario: Scenario, pattern: Pattern) -> None:
     if name is not None:
         valid = f"a place clear of the obstacle '{name}', which now reaches into the pattern"
         raise BadInputError([Problem("pattern.position_m", list(config.position_m), valid)])
+
+
+def _refuse_overlap(scenario: Scenario) -> None:
+    """Refuse a cluster of which two patterns share space."""
+    assert scenario.pattern is not None
+    met: list[TriangleMesh] = []
+    bodies = scenario.pattern.bodies
+    for number, body in enumerate(bodies if len(bodies) > 1 else ()):
+        pattern = pattern_of(scenario.model_copy(update={"pattern": body}))
+        outer = pattern.surface.outer
+        name = pattern.surrounded(Scene(3, (), (), (), meshes=tuple(met))).overlapped_by()
+        if name is not None:
+            valid = f"a place clear of {name}, which now reaches into this pattern"
+            key = f"pattern.others.{number - 1}.position_m"
+            raise BadInputError([Problem(key, list(body.position_m), valid)])
+        own = f"pattern.others.{number - 1}" if number else "the first pattern"
+        met.append(TriangleMesh(own, outer.vertices_m, outer.facets))

@@ -75,13 +75,14 @@ def _refuse_other_mesh(scenario: Scenario, pattern: Pattern) -> None:
     """Refuse a drawn pattern that is not meshed here as where the study was planned."""
     config = scenario.pattern
     assert config is not None
-    if not isinstance(config.shape, PatternDrawing):
+    drawn = [b.shape.file for b in config.bodies if isinstance(b.shape, PatternDrawing)]
+    if not drawn:
         return
     planned_m = next(m.vertices_m for m in scenario.scene.meshes if m.name == config.name)
     here_m = pattern.surface.outer.vertices_m
     if planned_m.shape != here_m.shape or not np.allclose(planned_m, here_m, rtol=0.0, atol=1e-9):
         valid = "a drawing that Gmsh meshes here as where the study was planned: the same version"
-        raise BadInputError([Problem("pattern.shape.file", config.shape.file, valid)])
+        raise BadInputError([Problem("pattern.shape.file", ", ".join(drawn), valid)])
 
 
 def _explicit_masses(foam: ExplicitFoam) -> str:

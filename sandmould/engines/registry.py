@@ -193,7 +193,7 @@ def _code_hash(scenario: Scenario) -> str:
 def code_groups(scenario: Scenario) -> list[list[Path]]:
     """Files that decide what is computed on any engine, and those of the scenario's engine."""
     of_every_engine = [ROOT / "sandmould" / name for name in _OF_EVERY_ENGINE]
-    pattern = (scenario.pattern.shape,) if scenario.pattern else ()
+    pattern = [body.shape for body in scenario.pattern.bodies] if scenario.pattern else []
     drawn = any(
         isinstance(solid, SolidMesh | PatternDrawing)
         for solid in (*scenario.obstacles, *scenario.cavities, *pattern)

@@ -199,10 +199,9 @@ class Loop(Section):
         return 1 + self.repeats if feeds_back else 1
 
 
-class PatternConfig(Section):
-    """A foam pattern that bends under the sand."""
+class Placed(Section):
+    """A body of foam in the box, and what holds it."""
 
-    name: str = quantity("pattern", "Name in tables.", source="user", pattern=r"^[a-z][a-z0-9_]*$")
     shape: Shape = Field(
         ..., description="Shape of the foam: one of the kinds below, or a drawing."
     )
@@ -213,6 +212,19 @@ class PatternConfig(Section):
     depth_m: float | None = quantity(
         None, "Extent of a shape along y in 3D; to the back of the box unless given. A mesh file "
         "has its own.", unit="m", source="user", gt=0, le=100,
+    )  # fmt: skip
+    supports: SupportsConfig = Field(
+        SupportsConfig(), description="What holds the pattern in the box."
+    )
+
+
+class PatternConfig(Placed):
+    """A foam pattern that bends under the sand."""
+
+    name: str = quantity("pattern", "Name in tables.", source="user", pattern=r"^[a-z][a-z0-9_]*$")
+    others: tuple[Placed, ...] | None = quantity(
+        None, "Further patterns of the same foam in the box, 3D only: with the first one a "
+        "cluster. Each has its own supports.", source="user", min_length=1, max_length=20,
     )  # fmt: skip
     element_m: float = quantity(
         0.005, "Longest side of an element; a mesh file has its own.", unit="m", source=ARGUED,
@@ -237,10 +249,14 @@ class PatternConfig(Section):
     tolerance_m: float | None = quantity(
         None, "Distance from the drawing that passes.", unit="m", source="user", gt=0, le=1
     )
-    supports: SupportsConfig = Field(
-        SupportsConfig(), description="What holds the pattern in the box."
-    )
     statics: Literal["linear", "large"] = quantity(
         "linear", "Small displacements, or large ones (total Lagrangian).", source=ARGUED
     )
     loop: Loop = Field(Loop(), description="How sand and pattern are coupled while it bends.")
+
+    @property
+    def bodies(self) -> tuple[PatternConfig, ...]:
+        """The patterns of a cluster, each as if it were alone."""
+        own = {name: getattr(self, name) for name in Placed.model_fields}
+        each = [own, *({n: getattr(o, n) for n in Placed.model_fields} for o in self.others or ())]
+        return tuple(self.model_copy(update=body | {"others": None}) for body in each)

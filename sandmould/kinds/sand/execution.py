@@ -30,8 +30,10 @@ class SandExecution(Execution[Scenario]):
     def render(self, run: Run, folder: Path) -> None:
         """Write the deck and the layers, unless a pattern's mesh has changed since the plan."""
         pattern = run.scenario.pattern
-        if pattern is not None and isinstance(pattern.shape, MeshFile):
-            mesh = pattern.shape
+        for body in () if pattern is None else pattern.bodies:
+            mesh = body.shape
+            if not isinstance(mesh, MeshFile):
+                continue
             now = with_hash(mesh.model_copy(update={"sha256": None}))
             if mesh.sha256 not in (None, now.sha256):
                 valid = "the file that the study was planned with; this one has changed since"

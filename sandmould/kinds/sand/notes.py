@@ -66,7 +66,7 @@ def _as_drawn(scenario: Scenario, solid: Outline | TriangleMesh) -> Outline | Tr
     pattern = scenario.pattern
     if pattern is None or solid.name != pattern.name:
         return solid
-    if not isinstance(pattern.shape, PatternDrawing):
+    if not isinstance(pattern.shape, PatternDrawing) or pattern.others:
         return solid
     drawn_m, triangles = drawn_surface(pattern.shape, "pattern.shape")
     return TriangleMesh(solid.name, drawn_m + np.array(pattern.position_m), triangles)

@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Iterable, Iterator, Mapping
 from pathlib import Path
+from typing import TypeVar
 
 from sandmould import pattern_fe
 from sandmould.bad_input import Problem
@@ -21,7 +22,7 @@ from sandmould.limits import FRAMES, RECORDS
 from sandmould.runs.hashing import scenario_hash
 from sandmould.runs.templates import Note
 from sandmould.scenario.checks.scene import problems as scene_problems
-from sandmould.scenario.pattern import MeshFile, PatternDrawing
+from sandmould.scenario.pattern import MeshFile, PatternDrawing, Placed
 from sandmould.scenario.placement import plan_counts
 from sandmould.scenario.scenario import Scenario
 from sandmould.scenario.solids import READ_BYTES, SolidMesh, with_hash
@@ -62,6 +63,8 @@ STEPPED_CACHED = 1_600
 PASS_S = 2e-3
 """Processor time of a pass of a window beside its grain-steps: loads, solution, new surface."""
 
+Body = TypeVar("Body", bound=Placed)
+
 
 class SandPlanning(Planning[Scenario]):
     """See ``Planning``."""
@@ -81,11 +84,11 @@ class SandPlanning(Planning[Scenario]):
             # scikit-fem: few studies need it
             from sandmould.pattern_fe.coupling.interface import with_surface
 
-            if isinstance(pattern.shape, MeshFile | PatternDrawing):
-                shape = with_hash(pattern.shape)
-                pattern = pattern.model_copy(update={"shape": shape})
-                scenario = scenario.model_copy(update={"pattern": pattern})
-            scenario = with_surface(scenario)
+            pattern = _hashed(pattern)
+            if pattern.others is not None:
+                others = tuple(_hashed(other) for other in pattern.others)
+                pattern = pattern.model_copy(update={"others": others})
+            scenario = with_surface(scenario.model_copy(update={"pattern": pattern}))
         solids = {"obstacles": scenario.obstacles, "cavities": scenario.cavities}
         hashed = {
             key: tuple(with_hash(s) if isinstance(s, SolidMesh) else s for s in every)
@@ -213,6 +216,13 @@ class SandPlanning(Planning[Scenario]):
     def settings_lines(self, scenarios: Iterable[Scenario]) -> list[str]:
         """What is asked of the vibrating table."""
         return table_lines(scenarios)
+
+
+def _hashed(body: Body) -> Body:
+    """A body of foam with the hash of the file that it names, if any."""
+    if not isinstance(body.shape, MeshFile | PatternDrawing):
+        return body
+    return body.model_copy(update={"shape": with_hash(body.shape)})
 
 
 def _foam_mb(scenario: Scenario) -> int:

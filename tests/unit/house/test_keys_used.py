@@ -34,6 +34,7 @@ PHYSICS = {
     "Rest.shaken_check_every_s": "tests/workflow/test_checks_while_shaken.py",
     "Recording.orientation": "tests/verification/cases/repeating.py",
     "Loop.most_factor": "tests/wedge.py",
+    "PatternConfig.others": "tests/verification/test_cluster.py",
     "Loop.mass_scale": "tests/verification/test_coupling_monolithic.py",
     "Loop.damping_ratio": "tests/verification/test_coupling_monolithic.py",
     **{f"Taken.{key}": "tests/workflow/test_deck_run.py" for key in Taken.model_fields},
@@ -56,7 +57,7 @@ PHYSICS = {
     ),
     "PatternConfig.crush_strength_pa": "tests/unit/kinds/test_sand_bending.py",
     "PatternConfig.tolerance_m": "tests/unit/kinds/test_sand_bending.py",
-    "PatternConfig.depth_m": "tests/unit/pattern_fe/test_pattern_scene.py",
+    "Placed.depth_m": "tests/unit/pattern_fe/test_pattern_scene.py",
 }
 """Keys that no shipped study sets, each with the test that knows the exact answer."""
 EXEMPT = {

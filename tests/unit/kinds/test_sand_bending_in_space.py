@@ -8,10 +8,12 @@ import meshio
 import numpy as np
 import pytest
 
+from sandmould.casting.arpm.scene import solids_of
 from sandmould.drawing.figures import DensityScale
 from sandmould.drawing.sphere_film import sphere_frames
 from sandmould.drawing.sphere_scene import sphere_scene
 from sandmould.engines.snapshot import Snapshot
+from sandmould.geometry.mesh import TriangleMesh
 from sandmould.kinds.sand.bending import BentPattern
 from sandmould.kinds.sand.bent_files import write_bent
 from sandmould.pattern_fe.coupling.foam_body import FoamBody
@@ -19,6 +21,8 @@ from sandmould.pattern_fe.coupling.interface import with_surface
 from sandmould.pattern_fe.scene import pattern_of
 from sandmould.report.bending_figures import _lines_m, draw_outlines
 from sandmould.scenario.scenario import Scenario
+from sandmould.study.plan.expand import expand
+from sandmould.study.plan.load_study import open_study
 from tests.patterns import _one_thread  # noqa: F401
 from tests.snapshots import write_snapshots
 
@@ -64,6 +68,25 @@ def test_a_bar_in_space_is_measured_and_written(tmp_path: Path) -> None:
     solid, surface = (meshio.read(out / f"pattern_final.{kind}") for kind in ("stl", "vtu"))
     assert solid.points.min(axis=0) == pytest.approx(snapshot.pattern_m.min(axis=0), abs=1e-7)
     np.testing.assert_allclose(surface.points, snapshot.pattern_m)
+
+
+def test_the_bent_bar_is_the_casting_of_a_study(tmp_path: Path) -> None:
+    scenario, snapshot = bar_run(tmp_path)
+    write_bent(scenario, tmp_path, tmp_path / "exports")
+    study = tmp_path / "freezes.yaml"
+    study.write_text(
+        "kind: solidification\nbased_on: bracket_freezes\nscenario:\n"
+        "  shapes: [{kind: mesh, name: bar, file: exports/pattern_final.stl}]\n"
+        "  box: {low_m: [-0.02, 0, 0], high_m: [0.08, 0.04, 0.06]}\n"
+        "  probes: [{name: middle, at_m: [0.03, 0.02, 0.035]}]\n",
+        encoding="utf-8",
+    )
+    (cast,) = solids_of(expand(open_study(study))[0].scenario)
+    assert snapshot.pattern_m is not None
+    bent = TriangleMesh("bent", snapshot.pattern_m, scenario.scene.meshes[0].triangles)
+    # seven digits of an STL file
+    assert cast.measure == pytest.approx(bent.measure, rel=1e-6)
+    assert bent.measure != pytest.approx(scenario.scene.meshes[0].measure, rel=1e-6)
 
 
 def test_its_cut_is_drawn_and_the_film_shows_it_bent(tmp_path: Path) -> None:
