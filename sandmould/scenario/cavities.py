@@ -76,6 +76,13 @@ class MeshCavity(SolidMesh):
     """A space bounded by the triangles of a closed STL file that the sand should fill, 3D only."""
 
     name: str = quantity(..., _NAME_MEANING, source="user", pattern=NAME)
+    hollow: int | None = quantity(
+        None,
+        "Where the file is that of the part: which of its hollows, counted from the largest. "
+        "A hollow is what its convex hull holds and the part does not.",
+        source="user",
+        ge=1,
+    )
     opens: Side | tuple[float, float, float] = quantity(
         "up", "Direction that it is open to in the box, a side or three numbers.", source=ARGUED
     )
@@ -129,7 +136,7 @@ def cavity_space(cavity: AnyCavity, dimension: int, key: str) -> Cavity:
         size_m = (cavity.diameter_m, cavity.length_m)
         rod = cylinder_along(cavity.name, np.array(cavity.centre_m), into, *size_m)
         return Cavity(cavity.name, rod, into)
-    return Cavity(cavity.name, mesh_solid(cavity, key), into)
+    return Cavity(cavity.name, mesh_solid(cavity, key, cavity.hollow), into)
 
 
 CELLS_A_GRAIN = {2: 16, 3: 8}

@@ -223,9 +223,13 @@ class PatternConfig(Placed):
 
     name: str = quantity("pattern", "Name in tables.", source="user", pattern=r"^[a-z][a-z0-9_]*$")
     others: tuple[Placed, ...] | None = quantity(
-        None, "Further patterns of the same foam in the box, 3D only: with the first one a "
-        "cluster. Each has its own supports.", source="user", min_length=1, max_length=20,
-    )  # fmt: skip
+        None,
+        "Further patterns of the same foam in the box, 3D only: with the first one a "
+        "cluster. Each has its own supports.",
+        source="user",
+        min_length=1,
+        max_length=20,
+    )
     element_m: float = quantity(
         0.005, "Longest side of an element; a mesh file has its own.", unit="m", source=ARGUED,
         gt=0, le=1,

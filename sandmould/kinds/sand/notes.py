@@ -13,6 +13,7 @@ from sandmould.kernel_cache import are_compiled
 from sandmould.kinds.sand.narrow import narrow_spaces
 from sandmould.runs import templates
 from sandmould.runs.templates import Note
+from sandmould.scenario.cavities import MeshCavity
 from sandmould.scenario.checks.wall_thickness import thinnest_wall
 from sandmould.scenario.hardness import LEAST_KAPPA, bed_hardness
 from sandmould.scenario.pattern import PatternDrawing
@@ -39,7 +40,7 @@ def notes(scenario: Scenario) -> tuple[Note, ...]:
         f"{key}.{n}": drawn_part(it, box_m)
         for key, solids in places.items()
         for n, it in enumerate(solids)
-        if isinstance(it, SolidMesh)
+        if isinstance(it, SolidMesh) and not getattr(it, "hollow", None)
     }
     return templates.notes(
         "plan_sand.j2",
@@ -56,6 +57,11 @@ def notes(scenario: Scenario) -> tuple[Note, ...]:
         walls={name: wall for name, wall in walls.items() if wall},
         smallest_m=smallest_m,
         drawings=drawn,
+        hollows={
+            f"cavities.{n}": scenario.scene.cavities[n].space
+            for n, it in enumerate(scenario.cavities)
+            if isinstance(it, MeshCavity) and it.hollow
+        },
         edges=scenario.engine.name == "liggghts" and bool(scenario.scene.meshes),
         **_of_pattern(scenario),
     )

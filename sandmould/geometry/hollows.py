@@ -1,0 +1,48 @@
+"""Hollows of a part: what its convex hull holds and the part does not."""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.spatial import ConvexHull
+
+from sandmould.geometry.mesh import TriangleMesh
+from sandmould.geometry.mesh_shells import SAME, extent, joined_sides, shells_of
+from sandmould.geometry.mesh_union import united
+
+Array = NDArray[np.float64]
+Ints = NDArray[np.int64]
+LEAST = 1e-4
+"""Share of the hull's volume below which a hollow is one between facets of a round part."""
+
+
+def hollows(vertices: Array, triangles: Ints) -> list[TriangleMesh]:
+    """Spaces that a closed surface leaves free in its convex hull, the largest first.
+
+    Parameters
+    ----------
+    vertices : (nv, 3) float64
+    triangles : (nt, 3) int64
+        Seen from outside.
+
+    Raises
+    ------
+    MeshFileError
+        When part and hull meet so nearly that what lies between cannot be told.
+    """
+    hull = ConvexHull(vertices)
+    if hull.volume - TriangleMesh("part", vertices, triangles).measure <= LEAST * hull.volume:
+        return []
+    outward = hull.simplices.astype(np.int64)
+    corners = vertices[outward]
+    normal = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
+    inward = np.sum(normal * hull.equations[:, :3], axis=1) < 0.0
+    outward[inward] = outward[inward, ::-1]
+    wide = np.linalg.norm(normal, axis=1) > SAME**2 * extent(vertices) ** 2
+    both = np.concatenate([outward[wide], triangles[:, ::-1]])
+    shell = np.repeat([0, 1], [wide.sum(), len(triangles)])
+    place, left = united(vertices, both, shell)
+    piece = shells_of(joined_sides(place, left), len(left))
+    found = [TriangleMesh("hollow", place, left[piece == n]) for n in range(piece.max() + 1)]
+    found = [it for it in found if it.measure > LEAST * hull.volume]
+    return sorted(found, key=lambda it: -it.measure)
