@@ -10,7 +10,7 @@ import pytest
 from sandmould.bad_input import BadInputError
 from sandmould.engines.driver import Driver
 from sandmould.engines.program import build_program
-from sandmould.engines.registry import engine_of
+from sandmould.engines.registry import engine_of, engine_problem
 from sandmould.kinds.sand.kind import SAND
 from sandmould.pattern_fe.coupling.interface import with_surface
 from sandmould.pattern_fe.coupling.opening import open_coupled
@@ -24,6 +24,13 @@ YOUNG_PA, POISSON = 1e5, 0.35
 SCHEMES = (
     "one_way", "per_layer", "fixed", "measured", "aitken", "quasi_newton", "in_step", "monolithic",
 )  # fmt: skip
+
+SAND_OF_DISCS = {"size_scale": 8.0, "size_classes": 3, "disc_thickness_m": 0.1}
+LIGGGHTS_SAND = {
+    "sand": SAND_OF_DISCS | {"disc_inertia": "sphere"},
+    "background_damping": {"form": "none"},
+}
+"""What LIGGGHTS asks for."""
 
 
 def column(scheme: str, engine: str = "reference") -> Scenario:
@@ -43,9 +50,10 @@ def column(scheme: str, engine: str = "reference") -> Scenario:
             },
             # walls that carry nothing
             "contact": {"grain_wall": {"friction": 0.0}},
-            "sand": {"size_scale": 8.0, "size_classes": 3, "disc_thickness_m": 0.1},
+            "sand": SAND_OF_DISCS,
             "fill": {"layers": [{"count": 60}]},
             "engine": {"name": engine},
+            **(LIGGGHTS_SAND if engine == "liggghts" else {}),
         }
     )
     return with_surface(scene)
@@ -64,6 +72,15 @@ def sag_m(scene: Scenario, pattern_m: np.ndarray) -> float:
 def test_foam_sags_as_the_closed_form_says(scheme: str, tmp_path: Path) -> None:
     """Weight over the confined block: W H/(M A), with M the constrained modulus."""
     assert_sags_exactly(column(scheme), tmp_path)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("engine", ["lammps", "liggghts"])
+def test_foam_sags_so_on_every_engine(engine: str, tmp_path: Path) -> None:
+    problem = engine_problem(column("aitken", engine))
+    if problem is not None:
+        pytest.skip(str(problem))
+    assert_sags_exactly(column("aitken", engine), tmp_path)
 
 
 def test_a_foam_that_creeps_in_every_step_is_waited_for(tmp_path: Path) -> None:
