@@ -20,13 +20,6 @@ from sandmould.dem.vectors import dim_of
 from sandmould.dem.wall_history import WallHistory
 
 
-def copied(part: Any) -> Any:
-    """The same with arrays of its own, also in tuples with names within it."""
-    if isinstance(part, np.ndarray):
-        return part.copy()
-    return type(part)(*map(copied, part)) if hasattr(part, "_fields") else part
-
-
 def to_arrays(moving: Moving) -> dict[str, np.ndarray]:
     """Arrays from which ``from_arrays`` goes on bit for bit; loads are left out."""
     walls, dim = moving.walls, dim_of(moving.grains.position.shape[1])

@@ -19,7 +19,6 @@ from sandmould.geometry.drawing_file import (
     is_step,
     tells_unit,
 )
-from sandmould.geometry.hollows import hollows
 from sandmould.geometry.mesh import TriangleMesh, signed_volumes_m3
 from sandmould.geometry.mesh_coarser import MANY, WITHIN, coarser
 from sandmould.geometry.mesh_crossing import check_crossings
@@ -118,29 +117,6 @@ def _read(path: Path, sha256: str) -> Reading:
     parts = coarse.vertices_m, coarse.triangles
     as_drawn = TriangleMesh("drawn", vertices, triangles)
     return Reading(*parts, whole, len(filled), turned, as_drawn, solid, WITHIN * extent(vertices))
-
-
-@lru_cache(maxsize=8)
-def _hollows(path: Path, sha256: str) -> list[TriangleMesh]:
-    """Hollows of the part in a file, once for each state of it."""
-    part = _read(path, sha256)
-    return hollows(part.vertices, part.triangles)
-
-
-def read_hollow(path: Path, number: int) -> tuple[Array, Triangles]:
-    """Surface of a hollow of the part in a file, counted from 1, the largest.
-
-    Raises
-    ------
-    MeshFileError
-        As :func:`read_drawing`; also where the part has fewer.
-    """
-    found = _hollows(path, file_hash(path))
-    if number > len(found):
-        sizes = ", ".join(f"{it.measure:.4g}" for it in found)
-        have = f"{len(found)}, in the file's cubic unit {sizes}" if found else "none: it is convex"
-        raise MeshFileError(f"a part with {number} hollow{'s'[: number > 1]}; this one has {have}")
-    return found[number - 1].vertices_m, found[number - 1].triangles
 
 
 def check_surface(vertices: Array, triangles: Triangles) -> None:

@@ -136,7 +136,12 @@ def cavity_space(cavity: AnyCavity, dimension: int, key: str) -> Cavity:
         size_m = (cavity.diameter_m, cavity.length_m)
         rod = cylinder_along(cavity.name, np.array(cavity.centre_m), into, *size_m)
         return Cavity(cavity.name, rod, into)
-    return Cavity(cavity.name, mesh_solid(cavity, key, cavity.hollow), into)
+    drawn = mesh_solid(cavity, key)
+    if cavity.hollow is not None:
+        from sandmould.scenario.hollows import hollow_of  # slow to import, and few scenes have it
+
+        drawn = hollow_of(drawn, cavity.hollow, key)
+    return Cavity(cavity.name, drawn, into)
 
 
 CELLS_A_GRAIN = {2: 16, 3: 8}

@@ -158,22 +158,20 @@ class Drawing(NamesFile, Protocol):
         """Length that stands for 1 in it."""
 
 
-def mesh_solid(solid: SolidMesh, key: str, hollow: int | None = None) -> TriangleMesh:
-    """Geometry of a mesh, scaled and shifted into the box, or of a hollow of it.
+def mesh_solid(solid: SolidMesh, key: str) -> TriangleMesh:
+    """Geometry of a mesh, scaled and shifted into the box.
 
     Raises
     ------
     BadInputError
         When the file bounds no solid, or is not the one that the scenario was planned with.
     """
-    drawn_m, triangles = drawn_surface(solid, key, hollow)
+    drawn_m, triangles = drawn_surface(solid, key)
     return TriangleMesh(solid.name, drawn_m + np.array(solid.position_m), triangles)
 
 
-def drawn_surface(
-    drawing: Drawing, key: str, hollow: int | None = None
-) -> tuple[Array, NDArray[np.int64]]:
-    """Closed surface of a drawing about its own origin, scaled, or of a hollow of it.
+def drawn_surface(drawing: Drawing, key: str) -> tuple[Array, NDArray[np.int64]]:
+    """Closed surface of a drawing about its own origin, scaled.
 
     Returns
     -------
@@ -185,8 +183,7 @@ def drawn_surface(
     BadInputError
         As :func:`mesh_solid`.
     """
-    # slow to import, and few scenes have it
-    from sandmould.geometry.mesh_file import read_hollow, read_surface
+    from sandmould.geometry.mesh_file import read_surface  # slow to import, and few scenes have it
 
     file_name = display_path(drawing.path)
     if tells_unit(drawing.path) and drawing.unit_m != 1.0:
@@ -197,9 +194,7 @@ def drawn_surface(
         if drawing.sha256 not in (None, sha256_now):
             valid = "the file that the study was planned with; this one has changed since"
             raise MeshFileError(valid)
-        vertices, triangles = (
-            read_surface(drawing.path) if hollow is None else read_hollow(drawing.path, hollow)
-        )
+        vertices, triangles = read_surface(drawing.path)
     except MeshFileError as fault:
         raise BadInputError([Problem(f"{key}.file", file_name, str(fault))]) from fault
     return drawing.unit_m * vertices, triangles

@@ -10,7 +10,6 @@ from typing import Any
 import numpy as np
 
 from sandmould.dem import source_hash
-from sandmould.dem.moving_state import copied
 from sandmould.dem.solver import NotANumberError
 from sandmould.dem.table import MountedTable
 from sandmould.engines.box_motion import displacements, start_of_grains
@@ -245,7 +244,7 @@ class ReferenceSession(StagedSession):
     def save_checkpoint(self) -> Any:
         """Copies of the solver's arrays with its lists, loads, where the stage stands."""
         solver, periods = self.solver, self._periods.steps
-        moving = copied(solver.moving)
+        moving = _copied(solver.moving)
         loads = moving.walls.loads
         loads[0], loads[1:] = loads.sum(axis=0), 0.0
         table = solver.steps, solver.table_places_m, periods
@@ -255,7 +254,7 @@ class ReferenceSession(StagedSession):
         """Compute on from what ``save_checkpoint`` gave."""
         solver = self.solver
         moving, table, means, stage = checkpoint
-        solver.moving = copied(moving)
+        solver.moving = _copied(moving)
         solver.surfaces.arrays = solver.moving.walls.arrays
         solver.steps, solver.table_places_m, self._periods.steps = table
         self._loads = dict(means)
@@ -275,3 +274,10 @@ class ReferenceSession(StagedSession):
 
     def close(self) -> None:
         """Free nothing: arrays go with the session."""
+
+
+def _copied(part: Any) -> Any:
+    """The same with arrays of its own, also in tuples with names within it."""
+    if isinstance(part, np.ndarray):
+        return part.copy()
+    return type(part)(*map(_copied, part)) if hasattr(part, "_fields") else part

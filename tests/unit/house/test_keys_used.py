@@ -34,7 +34,7 @@ PHYSICS = {
     "Rest.shaken_check_every_s": "tests/workflow/test_checks_while_shaken.py",
     "Recording.orientation": "tests/verification/cases/repeating.py",
     "Loop.most_factor": "tests/wedge.py",
-    "MeshCavity.hollow": "tests/unit/geometry/test_hollows.py",
+    "MeshCavity.hollow": "tests/unit/scenario/test_hollows.py",
     "PatternConfig.others": "tests/verification/test_cluster.py",
     "Loop.mass_scale": "tests/verification/test_coupling_monolithic.py",
     "Loop.damping_ratio": "tests/verification/test_coupling_monolithic.py",
