@@ -47,10 +47,9 @@ IN_3D = 0.4
 STATE_BYTES, SNAPSHOT_BYTES = {2: 230, 3: 560}, {2: 75, 3: 97}
 """Disk that a grain at rest takes in a checkpoint of the reference engine, with its contacts, and
 in a snapshot: measured at 282 discs and 2 000 spheres."""
-PASSES = 4.1
-"""Times that a window of sand and pattern is computed, where it may be repeated. Between 3.1 on a
-bracket of foam (study bracket_foam_small), 3.6 to 3.8 on the L that is filled at hard sand
-(l_deflection) and 5.0 to 5.8 where it is shaken deep in sand (l_depth): within 1.4 of each."""
+PASSES = 3.2
+"""Times that a window of sand and pattern is computed, where it may be repeated: 2.4 on the L of
+l_pattern_small, 2.8 on one of 591 discs, 3.2 on a bracket of foam (bracket_foam_small)."""
 MEASURING_3D_S = 1.3
 """Processor time for measures and pictures in 3D beside what any job takes: 1.4 to 4.0 s a run in
 four shipped studies, nothing in a fifth (docs/developers/prices.md); in 2D it is lost in the
