@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections.abc import Iterable, Mapping
 from typing import TYPE_CHECKING, Annotated, Any, ClassVar
 
 from pydantic import Field
@@ -138,6 +138,11 @@ class Study(Section):
     def table_limit(self, scenario: Any) -> str:
         """Key of the limit of the user's table that a setting lies beyond; empty where none."""
         return ""
+
+    @property
+    def table_limits(self) -> Mapping[str, float]:
+        """Limits of the user's table that are stated, by key."""
+        return {}
 
     def table_limit_at(self, end: SweepEnd) -> str:
         """Key of the limit that keeps the table from going beyond an end of the sweep."""

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from typing import TYPE_CHECKING, Literal
 
 from pydantic import Field
@@ -55,6 +56,11 @@ class SandStudy(Study):
         shakings = (*scenario.fill.shakings, *scenario.vibrations)
         limits = (self.table.limit_beyond(laid_down_drive(each)) for each in shakings)
         return next(filter(None, limits), "")
+
+    @property
+    def table_limits(self) -> Mapping[str, float]:
+        """See ``Study``."""
+        return self.table.model_dump(exclude_none=True)
 
     def table_limit_at(self, end: SweepEnd) -> str:
         """See ``Study``; of a swept number of a stage of vibration."""

@@ -158,7 +158,12 @@ def _stand_ins(keys: Sequence[str]) -> tuple[str, ...]:
     """Which values are not what they stand for."""
     if not keys:
         return ()
-    names = [f"{key.rpartition('.')[0].replace('.', ' ')} {name_of(key)}" for key in keys]
+    names = [
+        f"temperature of the {key.rpartition('.')[2]} at the beginning"
+        if key.startswith("initial_k.")
+        else f"{key.rpartition('.')[0].replace('.', ' ')} {name_of(key)}"
+        for key in keys
+    ]
     return (f"Placeholder values, so do not use these times for your alloy: "
             f"{listed(names, most=20)}.",)  # fmt: skip
 

@@ -81,7 +81,7 @@ def price(plan: Plan, results: Path, cores: int) -> str:
     prices = known_prices(plan, results)
     return (
         plan_table([*plan.fills, *plan.runs], prices, cores)
-        + beyond_line(plan.beyond_table)
+        + beyond_line(plan.beyond_table, plan.study.study.table_limits)
         + later_lines(plan.later, prices, cores)
     )
 

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import MISSING, fields
 from functools import cache
 from pathlib import Path
@@ -18,7 +18,7 @@ from sandmould.definition.sweep import Point
 from sandmould.digest import SHORT, digest
 from sandmould.kinds.registry import kind_named, kind_of
 from sandmould.runs.files import write_text
-from sandmould.runs.formatting import listed, setting_text, size_text
+from sandmould.runs.formatting import listed, name_of, setting_text, size_text, value_text
 from sandmould.runs.progress import duration_text
 from sandmould.runs.templates import Note
 from sandmould.scenario.quantity import Section
@@ -220,12 +220,13 @@ def plan_table(runs: Sequence[Run], prices: Prices, cores: int) -> str:
     return "\n".join(line.rstrip() for line in lines) + "\n"
 
 
-def beyond_line(left_out: Sequence[Point]) -> str:
-    """Which points of a sweep the user's table cannot do, as a line; empty without any."""
+def beyond_line(left_out: Sequence[Point], limits: Mapping[str, float]) -> str:
+    """Which points of a sweep lie beyond the limits of the user's table, as a line, if any do."""
     if not left_out:
         return ""
     told = listed([setting_text(point) for point in left_out], most=LISTED_POINTS)
-    return f"Left out, since your table cannot do it: {told}.\n"
+    of_table = listed([f"{name_of(key)} {value_text(key, v)}" for key, v in limits.items()])
+    return f"Left out, since your table cannot do it ({of_table}): {told}.\n"
 
 
 def later_lines(later: Sequence[Run], prices: Prices, cores: int) -> str:

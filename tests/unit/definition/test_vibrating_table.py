@@ -52,7 +52,10 @@ def test_settings_beyond_the_table_are_left_out(
     assert frequencies_hz(plan) == left
     beyond = [hz for hz in (10, 25, 50, 90) if hz not in left]
     assert [point[HZ] for point in plan.beyond_table] == beyond
-    assert ("Left out" in price(plan, tmp_path, 1)) == bool(beyond)
+    said = price(plan, tmp_path, 1)
+    assert ("Left out" in said) == bool(beyond)
+    if "largest_displacement_m" in limits:
+        assert "since your table cannot do it (largest displacement 0.6 mm): 10 Hz." in said
 
 
 def test_a_vibration_during_the_fill_counts(tmp_path: Path) -> None:
