@@ -167,6 +167,11 @@ PRINTS = TEMPLATE + "thermo_style custom step time v_speed &\n  v_height # v_wid
             "v_speed",
             "a deck that prints the time: thermo_style custom step time",
         ),
+        (
+            PRINTS.replace("v_speed", "ke"),
+            "ke",
+            "measures.speed_m_s = 'ke' cannot be used: valid is its heading in the log, KinEng",
+        ),
         # What an engine names itself, and what the text of a deck does not show, a run tells.
         (PRINTS, "KinEng", ""),
         (PRINTS.replace("v_speed", "${what}"), "v_speed", ""),

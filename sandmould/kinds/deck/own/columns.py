@@ -12,6 +12,14 @@ _HIDES = ("include", "jump", "if", "python", "shell", "partition")
 """Commands behind which a deck may print what its text does not show."""
 _OF_USER = re.compile(r"^[vcf]_\w+$")
 """A column that LAMMPS heads as the deck names it."""
+_HEADINGS = {
+    "ke": "KinEng",
+    "pe": "PotEng",
+    "etotal": "TotEng",
+    "vol": "Volume",
+    "cpu": "CPU",
+}
+"""Of keywords that LAMMPS does not head by their own name with a capital."""
 
 
 def column_problems(scenario: OwnDeck, deck: str) -> Iterator[Problem]:
@@ -27,9 +35,14 @@ def column_problems(scenario: OwnDeck, deck: str) -> Iterator[Problem]:
         yield Problem("template", scenario.template, valid)
     for name, column in scenario.columns.items():
         # LIGGGHTS heads columns by other names, and so do all engines those of their own.
-        if scenario.engine.name == "lammps" and _OF_USER.match(column) and column not in printed:
+        if scenario.engine.name != "lammps":
+            continue
+        if _OF_USER.match(column) and column not in printed:
             valid = f"a column that the deck prints: {', '.join(printed)}"
             yield Problem(f"measures.{name}", column, valid)
+        elif column in printed and not _OF_USER.match(column):
+            heading = _HEADINGS.get(column, column.capitalize())
+            yield Problem(f"measures.{name}", column, f"its heading in the log, {heading}")
 
 
 def _printed(deck: str) -> list[str] | None:
