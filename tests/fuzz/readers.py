@@ -79,9 +79,10 @@ def _checkpoint_mark(path: Path) -> object:
 
 
 def _snapshot(path: Path) -> object:
-    from sandmould.engines.snapshot import Snapshot
+    from sandmould.engines.snapshot_file import SNAPSHOTS, stored_snapshots
 
-    return Snapshot.load(path)
+    path.replace(path.parent / SNAPSHOTS)
+    return [stored.load() for stored in stored_snapshots(path.parent)]
 
 
 def _grains(path: Path) -> object:

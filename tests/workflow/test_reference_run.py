@@ -12,12 +12,13 @@ import pytest
 from sandmould.engines.program import build_program
 from sandmould.engines.reference.session import ReferenceSession
 from sandmould.engines.session import RefusedError, StepMover
-from sandmould.engines.snapshot import Snapshot
+from sandmould.engines.snapshot_file import stored_snapshots
 from sandmould.execution.simulate import RESTARTABLE_EXIT
 from sandmould.runs.outcome import Outcome, RunOutcome
 from sandmould.runs.run_tables import read_costs
 from sandmould.scenario.scenario import Scenario
 from tests.scenes import tube_scene
+from tests.snapshots import write_snapshots
 from tests.workflow.runs import (
     SOON,
     computed,
@@ -190,8 +191,9 @@ def test_orientations_are_recorded_where_asked(changes: dict[str, Any], tmp_path
     session.start_stage(program.stages[0])
     for _ in range(20):
         session.advance()
-    session.snapshot().save(tmp_path / "one.npz")
-    kept = Snapshot.load(tmp_path / "one.npz")
+    write_snapshots(tmp_path, [session.snapshot()])
+    (stored,) = stored_snapshots(tmp_path)
+    kept = stored.load()
     assert kept.orientation is not None
     d = program.scenario.dimension
     assert kept.orientation.shape == (len(kept.id), 1 if d == 2 else 9)

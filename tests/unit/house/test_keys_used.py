@@ -35,7 +35,7 @@ PHYSICS = {
     "Recording.orientation": "tests/verification/cases/repeating.py",
     "Loop.most_factor": "tests/wedge.py",
     "MeshCavity.hollow": "tests/unit/scenario/test_hollows.py",
-    "PatternConfig.others": "tests/verification/test_cluster.py",
+    "PatternConfig.others": "tests/verification/test_pattern_cluster.py",
     "Loop.mass_scale": "tests/verification/test_coupling_monolithic.py",
     "Loop.damping_ratio": "tests/verification/test_coupling_monolithic.py",
     **{f"Taken.{key}": "tests/workflow/test_deck_run.py" for key in Taken.model_fields},
