@@ -409,8 +409,11 @@ def compare(
     from sandmould.report.comparison import read_comparison, write_comparison
     from sandmould.study.plan.build_plan import RESULTS
 
-    found = {each: [f for f in (Path(each), RESULTS / each) if f.is_dir()] for each in studies}
-    folders = [(found[each] or [RESULTS / study_file(each).stem])[0] for each in studies]
+    folders = [
+        next((path for path in (Path(each), RESULTS / each) if path.is_dir()), None)
+        or RESULTS / study_file(each).stem
+        for each in studies
+    ]
     compared = read_comparison(folders)
     out = output or Path(
         "_".join([*(folder.resolve().name for folder in folders), "compared.html"])

@@ -291,7 +291,7 @@ class AnswerWords:
     @staticmethod
     def _section(key: str) -> str:
         section = key.partition(".")[0]
-        return "temperatures at the beginning" if section == "initial_k" else section
+        return "initial temperatures" if section == "initial_k" else section
 
     @property
     def stand_in_of(self) -> str:

@@ -38,7 +38,7 @@ def trouble(folder: Path, log: Path) -> str:
         )
     if of_jobs := dict.fromkeys(_OF_JOB.findall(text)):
         said = "\n".join(f"{Path(log).stem}: {why}. Its log: {log}" for why, log in of_jobs)
-        return f"Not computed, though tried again:\n{said}"
+        return f"The study stopped:\n{said}"
     words = [line.strip() for line in text.splitlines() if line.strip()]
     found = list(dict.fromkeys(line for line in words if _TROUBLE.search(line)))
     told = "; ".join(found[:LISTED_LINES] or words[-LISTED_LINES:])

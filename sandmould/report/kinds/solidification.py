@@ -159,7 +159,7 @@ def _stand_ins(keys: Sequence[str]) -> tuple[str, ...]:
     if not keys:
         return ()
     names = [
-        f"temperature of the {key.rpartition('.')[2]} at the beginning"
+        f"initial temperature of the {key.rpartition('.')[2]}"
         if key.startswith("initial_k.")
         else f"{key.rpartition('.')[0].replace('.', ' ')} {name_of(key)}"
         for key in keys

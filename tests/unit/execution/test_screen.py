@@ -285,7 +285,7 @@ Error in rule simulate:
 """
     log.write_text(tried + "Trying to restart job 2.\n" + tried)
     assert trouble(tmp_path, log) == (
-        "Not computed, though tried again:\nsimulate_r1: was killed: the same command continues "
+        "The study stopped:\nsimulate_r1: was killed: the same command continues "
         "it. Its log: results/chute/logs/simulate_r1.log"
     )
 

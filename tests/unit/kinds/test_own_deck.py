@@ -170,7 +170,7 @@ PRINTS = TEMPLATE + "thermo_style custom step time v_speed &\n  v_height # v_wid
         (
             PRINTS.replace("v_speed", "ke"),
             "ke",
-            "measures.speed_m_s = 'ke' cannot be used: valid is its heading in the log, KinEng",
+            "measures.speed_m_s = 'ke' cannot be used: valid is its heading, KinEng",
         ),
         # What an engine names itself, and what the text of a deck does not show, a run tells.
         (PRINTS, "KinEng", ""),

@@ -42,7 +42,7 @@ def column_problems(scenario: OwnDeck, deck: str) -> Iterator[Problem]:
             yield Problem(f"measures.{name}", column, valid)
         elif column in printed and not _OF_USER.match(column):
             heading = _HEADINGS.get(column, column.capitalize())
-            yield Problem(f"measures.{name}", column, f"its heading in the log, {heading}")
+            yield Problem(f"measures.{name}", column, f"its heading, {heading}")
 
 
 def _printed(deck: str) -> list[str] | None:
