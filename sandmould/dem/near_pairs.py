@@ -183,6 +183,13 @@ def _carry(dim: Any, contacts: Contacts, bound: Ints, near: NearPairs) -> None:
                         near.history[row, k, lane] = slides[k]
                         near.history[row, spins + k, lane] = rolls[k]
                     break
+    for s in range(len(near.grain)):
+        for lane in range(1, width):
+            # A lane behind the last repeats its grain, and what it finds is kept.
+            if near.grain[s, lane] == near.grain[s, lane - 1]:
+                for row in range(near.first_row[s], near.last_row[s]):
+                    for k in range(2 * spins):
+                        near.history[row, k, lane] = near.history[row, k, lane - 1]
 
 
 @njit(**OPTIONS)
