@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 
 from sandmould.analysis.feeding import NIYAMA_LOW, owner_grid
 from sandmould.analysis.freezing import Freezing
+from sandmould.scenario.units import ZERO_K
 
 Array = NDArray[np.float64]
 DistanceM = Callable[[Array], Array]
@@ -60,7 +61,8 @@ def draw_temperature(
 ) -> None:
     """Draw temperatures at the end over casting and mould, as ``draw_freezing``."""
     cut, axis, at_m = _cut(fields, freezing)
-    _draw(cut, axis, cut["temperature_k"], axes, "temperature at the end, K", "inferno")
+    celsius = cut["temperature_k"] - ZERO_K
+    _draw(cut, axis, celsius, axes, "temperature at the end, °C", "inferno")
     if distance_m is not None:
         _draw_outline(cut, axis, at_m, axes, distance_m)
 

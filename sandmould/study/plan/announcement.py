@@ -8,11 +8,13 @@ from pathlib import Path
 from typing import Literal
 
 from sandmould.bad_input import BadInputError, Problem
+from sandmould.definition.run import FILL
 from sandmould.kinds.kind import AnyScenario, SpeedClass
+from sandmould.runs.progress import duration_text
 from sandmould.runs.words import say
 from sandmould.study.plan.batches import Batch, mark_done
 from sandmould.study.plan.build_plan import Plan, writing
-from sandmould.study.plan.lacking import Lack, note_lacks
+from sandmould.study.plan.lacking import WHOLE, Lack, Need, note_lacks
 from sandmould.study.plan.ownership import write_owner
 from sandmould.study.plan.plan_files import (
     beyond_line,
@@ -21,7 +23,7 @@ from sandmould.study.plan.plan_files import (
     write_plan,
     write_study,
 )
-from sandmould.study.plan.price import Prices, computed_wall_s, ratios_of
+from sandmould.study.plan.price import Prices, computed_wall_s, ratios_of, study_s
 from sandmould.study.plan.trust import may_run
 
 MEASURING_S = 10.0
@@ -41,7 +43,7 @@ def announce(
     if measure == "all" or (measure == "engines" and plan.kind.planning.program is None):
         measure_speeds(plan, results)
     title = plan.study.study.title or plan.study.name
-    return f"\n{title}\n{price(plan, results, cores)}"
+    return f"\n{title}\n{price(plan, results, cores)}{left_line(plan, results, cores)}"
 
 
 def write_files(plan: Plan, results: Path) -> None:
@@ -84,6 +86,20 @@ def price(plan: Plan, results: Path, cores: int) -> str:
         + beyond_line(plan.beyond_table, plan.study.study.table_limits)
         + later_lines(plan.later, prices, cores)
     )
+
+
+def left_line(plan: Plan, results: Path, cores: int) -> str:
+    """How many runs have ended here, and what the others take; empty where all are to come."""
+    if not (results / plan.study.name / "runs").is_dir():
+        return ""
+    found, runs = plan.lacks(results), [*plan.fills, *plan.runs]
+    left = [run for run in runs if found.get(run.run, WHOLE).need is Need.COMPUTE]
+    ended = len(plan.runs) - sum(run.part != FILL for run in left)
+    if not left:
+        return f"All {ended} runs have ended here.\n"
+    pieces = [known_prices(plan, results).piece(run) for run in left]
+    takes = f"the others take about {duration_text(study_s(pieces, cores))}"
+    return f"{ended} of {len(plan.runs)} runs have ended here; {takes}.\n" if ended else ""
 
 
 def known_prices(plan: Plan, results: Path) -> Prices:
