@@ -7,12 +7,12 @@ import pandas as pd
 
 from benchmarks.frequency_law import groups
 
-POINTS = 14
+POINTS = 20
 """Along either axis, evenly over the logarithms of what the records have."""
 
 
 def map_text(settings: pd.DataFrame, error: float) -> str:
-    """Tabulate the law over velocity and f over c/(4 H), empty where no record is near.
+    """Tabulate the law over the groups of ``MAP``, empty where no record is near.
 
     Parameters
     ----------
@@ -21,12 +21,12 @@ def map_text(settings: pd.DataFrame, error: float) -> str:
     error : float
         Of fill, where curves are foretold by the others.
     """
-    axes = {name: _points(settings[name]) for name in groups.LAW}
-    law = groups.FillLaw(settings)
+    axes = {name: _points(settings[name]) for name in groups.MAP}
+    law = groups.FillLaw(settings, groups.MAP)
     rows = []
-    for velocity in axes["velocity_m_s"]:
-        low, high = groups.shaken_range(settings, velocity)
-        asked = pd.DataFrame({"velocity_m_s": velocity, "in_modes": axes["in_modes"]})
+    for velocity in axes["over_fall"]:
+        low, high = groups.shaken_range(settings, velocity, "over_fall")
+        asked = pd.DataFrame({"over_fall": velocity, "in_modes": axes["in_modes"]})
         near = asked["in_modes"].between(low / groups.NEAR, high * groups.NEAR)
         fill = np.where(near, law.at(asked), np.nan)
         rows.append(", ".join(".nan" if np.isnan(x) else f"{x:.3f}" for x in fill))

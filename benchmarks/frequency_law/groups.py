@@ -19,6 +19,8 @@ from numpy.typing import NDArray
 from threadpoolctl import threadpool_limits
 
 from benchmarks.frequency_law.series import FillCurve
+from sandmould.scenario.box import Tube
+from sandmould.scenario.vibration import STANDARD_GRAVITY_M_S2
 
 Array = NDArray[np.float64]
 GROUPS = {
@@ -47,11 +49,20 @@ EXPLANATIONS: dict[str, tuple[str, ...]] = {
 """What may move the sand, and the groups that the fill would go with then."""
 LAW = ("velocity_m_s", "in_modes")
 """The pair that the page's last part is about."""
-ASKED_OVER_TIME = (LAW, ("velocity_m_s",), ("in_modes",), ("acceleration_g", "velocity_m_s"))
-"""The pair, each of the two alone, and all that is known of the motion without the sand's c."""
+DIMENSIONLESS: dict[str, tuple[str, ...]] = {
+    "velocity": LAW,
+    "velocity over sqrt(g H)": ("over_fall", "in_modes"),
+    "velocity over sqrt(g D) of the tube": ("over_tube", "in_modes"),
+    "velocity over sqrt(g d) of the grains": ("over_grain", "in_modes"),
+}
+"""Velocity alone, and made dimensionless by each length of the scene, with the other group."""
+MAP = ("over_fall", "in_modes")
+"""Those that a plan's map goes with: velocity over that of a fall through the bed instead."""
 
 THROWN_G = 1.0
 """Below it the box never throws the sand, so nothing of the law can hold."""
+HELD_G = 0.02
+"""Below this standard deviation over a curve the acceleration is held."""
 NEAR = 1.3
 """A setting is near a velocity within this factor."""
 
@@ -66,11 +77,27 @@ class Collapse:
 
 
 @dataclass(frozen=True)
+class Regret:
+    """What it costs to take the setting that some groups foretell for a curve left out."""
+
+    study: str
+    label: str
+    range_hz: tuple[float, float]
+    regrets: tuple[float, ...]
+    """Of each set of groups: fill of the best setting less that of the one foretold."""
+
+
+@dataclass(frozen=True)
 class HeldOut:
     """What the law says of a study that it was not fitted to."""
 
     settings: pd.DataFrame
     """With ``predicted``, the law's fill."""
+
+    @property
+    def whole_error(self) -> float:
+        """Root mean square of measured less predicted."""
+        return math.hypot(self.shift, self.error)
 
     @property
     def shift(self) -> float:
@@ -97,18 +124,24 @@ def settings_of(series: Sequence[FillCurve]) -> pd.DataFrame:
     Returns
     -------
     DataFrame
-        ``curve`` (int), ``study``, ``label``, ``GROUPS`` and the groups of ``EXPLANATIONS``, mean
-        ``fill`` and its standard error ``se``.
+        ``curve`` (int), ``study``, ``label``, ``GROUPS``, the groups of ``EXPLANATIONS`` and of
+        ``DIMENSIONLESS``, mean ``fill`` and its standard error ``se``. The acceleration is that
+        over the scene's own gravity.
     """
     rows: list[pd.DataFrame] = []
     for curve, one in enumerate(series):
         fills, depth_m, speed_m_s = one.fills, one.depth_m, one.wave_speed_m_s
         gravity_m_s2 = one.scenario.gravity_m_s2
         velocity_m_s, amplitude_m = one.drives["velocity_m_s"], one.drives["displacement_m"]
+        widths_m = [o.diameter_m for o in one.scenario.obstacles if isinstance(o, Tube)]
+        grain_m = one.scenario.sand.mass_median_diameter_m
         rows.append(
             one.drives.assign(
+                acceleration_g=one.drives["acceleration_g"] * STANDARD_GRAVITY_M_S2 / gravity_m_s2,
                 strain=velocity_m_s / speed_m_s,
                 over_fall=velocity_m_s / math.sqrt(gravity_m_s2 * depth_m),
+                over_tube=velocity_m_s / math.sqrt(gravity_m_s2 * sum(widths_m or [math.nan])),
+                over_grain=velocity_m_s / math.sqrt(gravity_m_s2 * grain_m),
                 sag_over_amplitude=gravity_m_s2 * depth_m**2 / (2 * speed_m_s**2) / amplitude_m,
                 curve=curve,
                 study=one.study,
@@ -151,31 +184,36 @@ def predicted_by_others(settings: pd.DataFrame, groups: Sequence[str] = LAW) -> 
     return predicted
 
 
-def held_out(settings: pd.DataFrame, others: pd.DataFrame) -> HeldOut:
+def regrets(settings: pd.DataFrame, asked: Sequence[Sequence[str]]) -> list[Regret]:
+    """Ask sets of groups for the best setting of each curve that holds the acceleration.
+
+    Parameters
+    ----------
+    settings : DataFrame
+        As of ``settings_of``; each curve is left out of the fit in turn.
+    asked : sequence of groups
+    """
+    found = []
+    for curve, mine in settings.groupby("curve", sort=False):
+        if mine["acceleration_g"].std() > HELD_G:
+            continue
+        others = settings[settings["curve"] != curve]
+        best = [FillLaw(others, names).at(mine).argmax() for names in asked]
+        fill, hz = mine["fill"].to_numpy(), mine["frequency_hz"]
+        found.append(
+            Regret(
+                *mine[["study", "label"]].iloc[0],
+                (float(hz.min()), float(hz.max())),
+                tuple(float(fill.max() - fill[each]) for each in best),
+            )
+        )
+    return found
+
+
+def held_out(settings: pd.DataFrame, others: pd.DataFrame, names: Sequence[str] = LAW) -> HeldOut:
     """Ask the law of ``settings`` for those of another curve, where its box throws the sand."""
     asked = thrown(others)
-    return HeldOut(asked.assign(predicted=FillLaw(settings).at(asked)))
-
-
-@dataclass(frozen=True)
-class AtTime:
-    """What the fill goes with after some of the vibration."""
-
-    time_s: float
-    fill: float
-    """Mean over all settings."""
-    spread: float
-    """Standard deviation over all settings."""
-    errors: tuple[float, ...]
-    """Of each of ``ASKED_OVER_TIME``."""
-
-
-def at_time(curves: Sequence[FillCurve], time_s: float) -> AtTime:
-    """Ask the groups of ``ASKED_OVER_TIME`` for the fill after ``time_s``, s."""
-    settings = thrown(settings_of(curves))
-    fill = settings["fill"]
-    errors = tuple(error_of(settings, names) for names in ASKED_OVER_TIME)
-    return AtTime(time_s, float(fill.mean()), float(fill.std()), errors)
+    return HeldOut(asked.assign(predicted=FillLaw(settings, names).at(asked)))
 
 
 class FillLaw:
@@ -214,8 +252,10 @@ class FillLaw:
         return predicted
 
 
-def shaken_range(settings: pd.DataFrame, velocity_m_s: float) -> tuple[float, float]:
+def shaken_range(
+    settings: pd.DataFrame, velocity: float, group: str = "velocity_m_s"
+) -> tuple[float, float]:
     """Least and greatest f over c/(4 H) of the settings near a velocity."""
-    near = np.abs(np.log(settings["velocity_m_s"] / velocity_m_s)) < np.log(NEAR)
+    near = np.abs(np.log(settings[group] / velocity)) < np.log(NEAR)
     in_modes = settings.loc[near, "in_modes"]
     return float(in_modes.min()), float(in_modes.max())

@@ -38,10 +38,15 @@ HELD_OUT = {
     "tube_thickness_certified": "discs 10 mm thick instead of 3.42 mm",
 }
 """Studies of the same tube that the law is asked for, not fitted to; what is special in them."""
-OF_THE_TUBE = ("tube_frequency", "tube_frequency_stroke")
-"""Those that differ in the size of their grains alone: a plan's map is fitted to them as well."""
-FEWEST_CURVES = 3
-"""Of a study that is asked at several times: a curve is predicted from the others."""
+OTHER_LENGTHS = {
+    "tube_law_width": "tube",
+    "tube_frequency": "grains two thirds as wide",
+    "tube_law_gravity": "half the gravity, for root two times as long",
+}
+"""Studies in which one length of the scene, or gravity, is another; what it is."""
+OF_THE_TUBE = ("tube_frequency", "tube_frequency_stroke", "tube_low_frequency")
+"""Those that differ in the size of their grains alone: a plan's map is fitted to them as well. The
+last is the low end of the first."""
 PREDICTED_M_S = (0.02, 0.04, 0.08)
 PREDICTED_IN_MODES = (0.1, 0.15, 0.2, 0.25, 0.3, 0.4, 0.5)
 """Where the page tabulates the law."""
@@ -71,17 +76,50 @@ def page(records: Path = RECORDS, picture: Path | None = None) -> str:
 
 def fill_map(records: Path = RECORDS) -> str:
     """Tabulate the law of all recorded curves of its tube and its sand, for plans of studies."""
+    thrown = groups.thrown(_of_the_tube(records))
+    return map_text(thrown, groups.error_of(thrown, groups.MAP))
+
+
+def _of_the_tube(records: Path) -> pd.DataFrame:
+    """Settings of all recorded curves of the tube, whose low end belongs to the curve above it."""
     curves = [s for name in COLLAPSED for s in _recorded(records)[name]["series"]]
     others = [RecordedCurves(records / name) for name in OF_THE_TUBE]
     settings = groups.settings_of([*curves, *(c for other in others for c in other.curves)])
-    thrown = groups.thrown(settings)
-    return map_text(thrown, groups.error_of(thrown))
+    above, _, low = OF_THE_TUBE
+    settings.loc[settings["study"] == low, ["study", "curve"]] = (
+        settings.loc[settings["study"] == above, ["study", "curve"]].iloc[0].to_list()
+    )
+    return settings
 
 
 def evidence(records: Path = RECORDS) -> str:
     """Write why these two numbers decide, and how well they predict."""
-    values = {"law": _law_of(records), "number": number}
+    law = _law_of(records)
+    values = {
+        "law": law,
+        "dimensionless": groups.DIMENSIONLESS,
+        "other_lengths": _other_lengths(law["settings"], records) if law else [],
+        "regrets": groups.regrets(groups.thrown(_of_the_tube(records)), (groups.LAW, groups.MAP)),
+        "number": number,
+    }
     return render(Path(__file__).with_name("evidence.md.j2"), values)
+
+
+def _other_lengths(settings: pd.DataFrame, records: Path) -> list[tuple[str, str, list[float]]]:
+    """What is another, the study, and the error of each dimensionless velocity."""
+    found = []
+    for name, what in OTHER_LENGTHS.items():
+        if not (records / name / "record.json").is_file():
+            continue
+        for curve in _study(records / name)["series"]:
+            others = groups.settings_of([curve])
+            errors = [
+                groups.held_out(settings, others, names).whole_error
+                for names in groups.DIMENSIONLESS.values()
+            ]
+            label = f"{what} {curve.label}" if curve.label else what
+            found.append((label, name, errors))
+    return found
 
 
 @functools.cache
@@ -158,10 +196,5 @@ def _law(there: Mapping[str, dict[str, Any]], others: Sequence[RecordedCurves]) 
             (HELD_OUT[study.name], curve, groups.held_out(settings, groups.settings_of([curve])))
             for study in others
             for curve in study.curves
-        ],
-        "over_time": [
-            (study.name, [groups.at_time(study.at(m), t) for m, t in study.moments.items()])
-            for study in others
-            if study.moments and len(study.curves) >= FEWEST_CURVES
         ],
     }

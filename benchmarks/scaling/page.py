@@ -6,15 +6,7 @@ from pathlib import Path
 from typing import Any
 
 from benchmarks.frame import render
-from benchmarks.scaling.model import Assumed, WorkflowCosts, drain
 
-SWEEPS = ((10_000, 60),)
-SETTINGS = (
-    ("a job a run", 0.0, 1),
-    ("jobs of one core", 300.0, 1),
-    ("the profile as it comes: whole nodes", 300.0, 32),
-    ("whole nodes, half an hour", 1800.0, 32),
-)
 WHEN_FAILING = {
     "sandmould": "the outcome says why; the others end; the report is written",
     "Snakemake with Paramspace": "with `--keep-going` the others end; no table",
@@ -39,9 +31,7 @@ def page(results: dict[str, Any]) -> str:
         What ``benchmarks.scaling`` measured.
     """
     rows: Rows = {int(runs): results["rows"][runs] for runs in sorted(results["rows"], key=int)}
-    costs, assumed = WorkflowCosts.of(results), Assumed()
     parts = _run_parts(results["parts"])
-    whole = drain(10_000, 10, 300.0, assumed.cores, costs, assumed)
     return render(Path(__file__).with_name("page.md.j2"), {
         **results,
         "rows": rows,
@@ -51,10 +41,6 @@ def page(results: dict[str, Any]) -> str:
         "parts_s": sum(parts.values()),
         "overhead_s": {name: _overhead_s(rows, name) for name in ("run_alone", "run_shared")},
         "graph_job": {of: _of_a_job(rows, of) for of in ("cpu_s", "peak_memory_bytes")},
-        "costs": costs,
-        "assumed": assumed,
-        "sweeps": _sweeps(costs, assumed),
-        "runs_per_s": 10_000 / whole.wall_s,
         "when_failing": WHEN_FAILING,
         "to_go_on": TO_GO_ON,
     })  # fmt: skip
@@ -87,16 +73,3 @@ def _of_a_job(rows: Rows, of: str) -> float:
     fewest, most = min(rows), max(rows)
     added = rows[most]["graph_alone"][of] - rows[fewest]["graph_alone"][of]
     return float(added / (3 * (most - fewest)))
-
-
-def _sweeps(costs: WorkflowCosts, assumed: Assumed) -> list[dict[str, Any]]:
-    """Sweeps on the modelled cluster."""
-    return [
-        {
-            "runs": runs, "run_s": run_s, "jobs_are": name,
-            "drain": drain(runs, run_s, batch_s, cores, costs, assumed),
-            "least_s": max(runs * run_s / (assumed.nodes * assumed.cores), run_s),
-        }
-        for runs, run_s in SWEEPS
-        for name, batch_s, cores in SETTINGS
-    ]  # fmt: skip

@@ -13,7 +13,7 @@ from sandmould.definition.study import Study
 from sandmould.kinds.registry import kind_named
 from sandmould.plain_file import UNREADABLE
 from sandmould.runs.columns import RUN
-from sandmould.runs.formatting import name_of, number
+from sandmould.runs.formatting import display_number, display_range, name_of
 from sandmould.statistics.agreement import sweep_part
 from sandmould.statistics.evidence import usable_values
 from sandmould.statistics.settings import Setting, setting_rows
@@ -63,7 +63,9 @@ class SoFar:
         if self._summary.empty:
             return ""
         values = usable_values(self._summary, measure)[self._summary[RUN] == run].dropna()
-        return f"{name_of(measure)} {number(values.iloc[0])}" if len(values) else ""
+        if values.empty:
+            return ""
+        return f"{name_of(measure)} {display_number(measure, values.iloc[0])}"
 
     def _read(self) -> None:
         if not self._unread:
@@ -95,28 +97,29 @@ def so_far_text(summary: pd.DataFrame, study: Study, settings: int) -> str:
         return ""
     what, runs = name_of(measure), sum(setting.n for setting in used)
     if not study.seeks_best:
-        low, high = (number(f(setting.mean for setting in used)) for f in (min, max))
-        between = low if low == high else f"{low} to {high}"
+        low, high = (f(setting.mean for setting in used) for f in (min, max))
+        between = display_range(measure, low, high) if low < high else display_number(measure, low)
         return f"{what} {between} by {_runs(runs)}"
     if len(used) == 1:
-        return f"{what} {_mean(verdict.best)}; nothing to compare with yet"
+        return f"{what} {_mean(verdict.best, measure)}; nothing to compare with yet"
     if not kind_named(study.kind).draws_by_lot:
-        return _best(verdict, what)
+        return _best(verdict, measure)
     resolved = verdict.resolved and len(used) == settings
-    return f"{'resolved' if resolved else 'not resolved yet'}, {_best(verdict, what)}"
+    return f"{'resolved' if resolved else 'not resolved yet'}, {_best(verdict, measure)}"
 
 
-def _best(verdict: Verdict, what: str) -> str:
+def _best(verdict: Verdict, measure: str) -> str:
     best, second = verdict.best, verdict.runner_up
     assert best is not None
     assert second is not None
-    where = f"{best.label} {_mean(best)}"
+    where = f"{best.label} {_mean(best, measure)}"
     most = "highest" if verdict.better == "larger" else "lowest"
-    return f"{most} {what} at {where}, then {second.label} {_mean(second)}"
+    then = f"{second.label} {_mean(second, measure)}"
+    return f"{most} {name_of(measure)} at {where}, then {then}"
 
 
-def _mean(setting: Setting) -> str:
-    return f"{number(setting.mean)} ({_runs(setting.n)})"
+def _mean(setting: Setting, measure: str) -> str:
+    return f"{display_number(measure, setting.mean)} ({_runs(setting.n)})"
 
 
 def _runs(n: int) -> str:

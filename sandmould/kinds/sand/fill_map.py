@@ -1,13 +1,14 @@
 """Which of a study's frequencies should fill a tube best, by the fitted map of our records.
 
-The fill goes with the velocity of the table and with the frequency over c/(4 H), so what stays
-constant when the frequency changes decides (docs/frequency_law.md). The map says nothing beyond the
-range of the records that it was fitted to.
+The fill goes with the velocity of the table, here over that of a fall through the bed, and with the
+frequency over c/(4 H), so what stays constant when the frequency changes decides
+(docs/frequency_law.md). The map says nothing beyond the range of the records that it was fitted to.
 """
 
 from __future__ import annotations
 
 import functools
+import math
 from collections.abc import Sequence
 from typing import Any
 
@@ -55,7 +56,8 @@ def _foretold(scenario: Scenario) -> float:
     if stage.unit_direction(scenario.dimension)[-1] < 1.0 or not _in_range(tubes[0], hardness):
         return np.nan
     drive = laid_down_drive(stage)
-    return _at(drive.velocity_m_s, drive.frequency_hz / hardness.column_hz)
+    fall_m_s = math.sqrt(scenario.gravity_m_s2 * hardness.depth_m)
+    return _at(drive.velocity_m_s / fall_m_s, drive.frequency_hz / hardness.column_hz)
 
 
 def _in_range(tube: Tube, hardness: Hardness) -> bool:
@@ -67,12 +69,12 @@ def _in_range(tube: Tube, hardness: Hardness) -> bool:
     return all(low <= asked[name] <= high for name, (low, high) in _map()["range"].items())
 
 
-def _at(velocity_m_s: float, in_modes: float) -> float:
+def _at(over_fall: float, in_modes: float) -> float:
     """Fill between the points of the map, along the logarithms; NaN beyond them."""
-    modes, speeds = np.log(_map()["in_modes"]), np.log(_map()["velocity_m_s"])
+    modes, speeds = np.log(_map()["in_modes"]), np.log(_map()["over_fall"])
     at_mode = np.log(in_modes)
     at_speeds = [np.interp(at_mode, modes, row, np.nan, np.nan) for row in _map()["fill"]]
-    return float(np.interp(np.log(velocity_m_s), speeds, at_speeds, np.nan, np.nan))
+    return float(np.interp(np.log(over_fall), speeds, at_speeds, np.nan, np.nan))
 
 
 @functools.cache

@@ -1,8 +1,7 @@
-"""The scaling benchmark: its stand-in, its model of a cluster, its page."""
+"""The scaling benchmark: its stand-in, its page."""
 
 from __future__ import annotations
 
-from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -10,16 +9,10 @@ import pytest
 
 from benchmarks.scaling.chart import draw
 from benchmarks.scaling.measure import executed, files
-from benchmarks.scaling.model import Assumed, WorkflowCosts, drain
 from benchmarks.scaling.page import page
 from benchmarks.scaling.peers import HERE, Tool, written_lines
 from benchmarks.scaling.study import REPLICATES, Place
 from sandmould.study.plan.build_plan import open_plan
-
-COSTS = WorkflowCosts(
-    plan_s=0.001, graph_s=0.005, snakemake_s=2.0, job_start_s=1.5, job_start_s_per_run=0.0,
-    imports_s=1.5, run_s=1.5, tables_s=0.005,
-)  # fmt: skip
 
 
 def row(runs: int, is_executed: bool) -> dict[str, Any]:
@@ -91,35 +84,6 @@ def test_page_and_picture_are_made_from_numbers(found: dict[str, Any], tmp_path:
     assert "0 of 40 finished runs redone" in text
     draw(found, tmp_path / "scaling.png")
     assert (tmp_path / "scaling.png").stat().st_size > 1e4
-
-
-def test_slopes_are_read_from_the_smallest_and_the_largest_study(found: dict[str, Any]) -> None:
-    costs = WorkflowCosts.of(found)
-    assert costs.graph_s == pytest.approx((0.0165 - 0.0015) / 3)
-    assert costs.job_start_s_per_run == pytest.approx(5e-4)
-    assert costs.run_s == pytest.approx(1.3 + 0.5 + 0.5)
-    assert costs.tables_s == pytest.approx(0.008)
-
-
-def test_one_run_on_the_cluster_takes_all_its_terms() -> None:
-    on = Assumed()
-    one = drain(1, 600.0, 0.0, 1, COSTS, on)
-    parts = (2.0 + 0.001 + 0.005, on.submit_s, 2 * 1.5 + 1.5 + 600 + 1.5, on.notice_s, 0.005)
-    assert one.wall_s == pytest.approx(sum(parts))
-    assert one.efficiency == pytest.approx(600 / 3200 / one.wall_s)
-    assert one.most_lost == "cores without a job"
-
-
-def test_a_hundred_jobs_of_one_core_are_no_hundred_nodes() -> None:
-    single = drain(10_000, 60.0, 300.0, 1, COSTS, Assumed())
-    whole = drain(10_000, 60.0, 300.0, 32, COSTS, Assumed())
-    assert single.efficiency < 1 / 32
-    assert whole.efficiency > 10 * single.efficiency
-    assert whole.jobs < 100
-    assert sum(whole.lost.values()) + whole.efficiency == pytest.approx(1)
-    # Submissions, one after the other, bound what a limit of jobs does not.
-    slow = drain(10_000, 10.0, 0.0, 1, COSTS, replace(Assumed(), jobs=3200, submit_s=1.0))
-    assert slow.wall_s > 10_000
 
 
 def test_lines_are_those_that_a_user_writes() -> None:

@@ -258,6 +258,11 @@ def test_the_verdict_so_far(plan: Plan) -> None:
     assert so_far_text(SUMMARY, study, 2) == f"resolved, {best}"
     # A third point has no run yet.
     assert so_far_text(SUMMARY, study, 3) == f"not resolved yet, {best}"
+    asked = {"measure": "pattern_tip_deflection_m", "better": "neither"}
+    bent = study.model_copy(update={"objective": study.objective.model_copy(update=asked)})
+    in_m = SUMMARY.assign(pattern_tip_deflection_m=[1e-3, 1e-3, 1e-3, 2e-3, 2e-3, 2e-3])
+    said = so_far_text(in_m, bent, 2)
+    assert said == "deflection of the pattern's tip 1.0 to 2.0 mm by 6 runs"
     failed = SUMMARY.assign(outcome_code=[0, 0, 0, 310, 310, 310])
     assert "nothing to compare with" in so_far_text(failed, study, 2)
 

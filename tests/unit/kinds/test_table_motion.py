@@ -47,6 +47,13 @@ def test_a_sideways_shake_throws_nothing(tmp_path: Path) -> None:
     assert "Below 1 g" not in plan_of(tmp_path, [0.5, 1.5], vibration=sideways)
 
 
+def test_half_the_gravity_is_left_at_half_the_acceleration(tmp_path: Path) -> None:
+    vibration = [{"frequency_hz": 50, "acceleration_g": 1.5}]
+    for gravity_m_s2, is_weak in ((9.81, True), (4.9, False)):
+        plan = plan_of(tmp_path, [0.7], gravity_m_s2=gravity_m_s2, vibration=vibration)
+        assert ("Below 1 g" in plan) is is_weak
+
+
 def foretold(folder: Path, hold: str, values: list[float], **scenario: Any) -> float:
     """Frequency that fills the shipped tube best by records."""
     amplitude = {
