@@ -202,7 +202,8 @@ def regrets(settings: pd.DataFrame, asked: Sequence[Sequence[str]]) -> list[Regr
         fill, hz = mine["fill"].to_numpy(), mine["frequency_hz"]
         found.append(
             Regret(
-                *mine[["study", "label"]].iloc[0],
+                mine["study"].iloc[0],
+                mine["label"].iloc[0],
                 (float(hz.min()), float(hz.max())),
                 tuple(float(fill.max() - fill[each]) for each in best),
             )
