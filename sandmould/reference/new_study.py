@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import math
 import os
 import shutil
 from collections.abc import Iterator
@@ -13,8 +14,11 @@ import numpy as np
 
 from sandmould import SHIPPED
 from sandmould.bad_input import BadInputError, Problem
+from sandmould.casting.arpm.scene import solids_of
 from sandmould.engines.deck import environment
 from sandmould.geometry.drawing_file import MeshFileError, tells_unit
+from sandmould.scenario.casting.solidification import Solidification
+from sandmould.scenario.checks.wall_thickness import thinnest_wall
 from sandmould.study.plan.build_plan import Plan, open_plan
 
 _HELD = ("acceleration_g", "velocity_mm_s", "amplitude_mm", "unbalance")
@@ -32,7 +36,7 @@ _OPTIONS: dict[str, dict[str, Any]] = {
     "pocket": {**_HOLE, "hole_mm": (25.0, 40.0), "opens": "down", "acceleration_g": 5.0},
     "part": {**_SHAKEN, "drawing": None},
     "deck": {},
-    "casting": {"material": "hirata_2019", "drawing": None},
+    "casting": {"material": "a356_silica", "drawing": None},
 }
 """Options of each study, and what is taken unless they are given."""
 _EXAMPLES = {
@@ -47,6 +51,8 @@ _ROOM_M = 0.03
 """Sand round a part (argued)."""
 _ELEMENTS = 8
 """Elements across the smallest extent of a casting (argued)."""
+_MOST_ELEMENTS = 32
+"""The same where its walls are thin (argued)."""
 _FOAM_M = 0.016
 """Longest element of foam: that of the shipped bracket."""
 _GATE_M = 0.01
@@ -73,12 +79,25 @@ def write_new_study(name: str, path: Path, given: dict[str, Any]) -> Plan:
     try:
         text = _study_text(name, path, given, beside)
         plan = open_plan(path, text=text)
+        if name == "casting" and (element_m := _finer_element_m(plan.runs[0].scenario)):
+            text = text.replace(*(f"element_m: {m:g} " for m in element_m))
+            plan = open_plan(path, text=text)
         path.write_text(text, encoding="utf-8")
     except BadInputError:
         if beside is not None:
             beside.unlink()
         raise
     return plan
+
+
+def _finer_element_m(scenario: Solidification) -> tuple[float, float] | None:
+    """Element of a casting, and half its thinnest wall where that is less; else None."""
+    element_m = scenario.element_m
+    wall = thinnest_wall(solids_of(scenario), 2.0 * element_m)
+    if wall is None:
+        return None
+    least_m = element_m * _ELEMENTS / _MOST_ELEMENTS
+    return element_m, max(math.floor(0.5e4 * wall.thickness_m) / 1e4, least_m)
 
 
 def _study_text(name: str, path: Path, given: dict[str, Any], beside: Path | None) -> str:

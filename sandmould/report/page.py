@@ -156,14 +156,14 @@ def _stand_ins(
     study_folder: Path, runs: Iterable[str], material: type[Section] | None
 ) -> tuple[str, ...]:
     """Values of materials that are not what they stand for, by their sources in the first run."""
-    sections = tuple(f"{name}." for name in material.model_fields) if material else ()
+    sections = set(material.model_fields) if material else set()
     for run in runs:
         with contextlib.suppress(BadInputError, OSError):
             sources = read_run(study_folder / "runs" / str(run) / "scenario.yaml").sources
             return tuple(
                 key
                 for key, source in sources.items()
-                if key.startswith(sections) and source.startswith(STAND_IN)
+                if key.partition(".")[0] in sections and source.startswith(STAND_IN)
             )
     return ()
 

@@ -291,7 +291,7 @@ class AnswerWords:
     @staticmethod
     def _section(key: str) -> str:
         section = key.partition(".")[0]
-        return "initial temperatures" if section == "initial_k" else section
+        return "initial temperatures" if section == "initial_k" else name_of(section)
 
     @property
     def stand_in_of(self) -> str:

@@ -6,9 +6,10 @@ Fields, cooling curves, error and cost.
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pandas as pd
@@ -161,7 +162,7 @@ def _stand_ins(keys: Sequence[str]) -> tuple[str, ...]:
     names = [
         f"initial temperature of the {key.rpartition('.')[2]}"
         if key.startswith("initial_k.")
-        else f"{key.rpartition('.')[0].replace('.', ' ')} {name_of(key)}"
+        else f"{key.rpartition('.')[0].replace('.', ' ')} {name_of(key)}".strip()
         for key in keys
     ]
     return (f"Placeholder values, so do not use these times for your alloy: "
@@ -214,13 +215,12 @@ def _fields(
     caption = "When each part of the casting froze, and the part as drawn (line)"
     where = ", cut through the last point to freeze" if scenario.dimensions == 3 else ""
     first = FirstPicture(png(alone), alt, f"{caption}{where}.")
-    last = np.argmin(np.linalg.norm(place_m - frozen.last_point_m, axis=1))
     said = sentences(
         "frozen.j2",
         it=frozen,
+        part=_of_part(fields, scenario),
         fed=fed,
         is_solid=math.isfinite(frozen.solidification_time_s),
-        in_riser=fed is not None and bool(fields["riser"][melts][last]),
         has_risers=bool(scenario.risers),
         reads=reads,
         limit=1e-3 * NIYAMA_LOW,
@@ -228,6 +228,14 @@ def _fields(
     )
     tables = (_spots(frozen), *([_cut_off(fed, scenario.dimensions)] if fed else []))
     return png(figure), first, said, tables, fed
+
+
+def _of_part(fields: Mapping[str, Any], scenario: Solidification) -> Freezing | None:
+    """How the casting froze without its risers; None where it has none."""
+    own = fields["melts"] & ~fields["riser"] if "riser" in fields else fields["melts"]
+    if not scenario.risers or not own.any():
+        return None
+    return freezing(fields["position_m"][own], fields["frozen_s"][own], scenario.hot_spot_reach_m)
 
 
 def _spots(frozen: Freezing) -> Table:

@@ -134,6 +134,14 @@ class MetalAndMould(Section):
         "(K), or the time since pouring (s).",
         source=ARGUED,
     )
+    read_at_solid_fraction: float = quantity(
+        0.7,
+        "Solid fraction at which gradient, cooling rate and Niyama's value are read, and up to "
+        "which metal flows; at least a tenth of the freezing range above the solidus.",
+        source=ARGUED,
+        gt=0,
+        lt=1,
+    )
     coating_m2k_w: float = quantity(
         0.0,
         "Resistance of a coating between casting and mould, its thickness over its conductivity: "
@@ -226,14 +234,6 @@ class Solidification(MetalAndMould):
     record_s: float = quantity(5.0, "Between records.", unit="s", source=ARGUED, gt=0)
     until_s: float = quantity(
         20000.0, "The run ends here if something is still liquid.", unit="s", source=ARGUED, gt=0
-    )
-    read_at_solid_fraction: float = quantity(
-        0.7,
-        "Solid fraction at which gradient, cooling rate and Niyama's value are read, and up to "
-        "which metal flows; at least a tenth of the freezing range above the solidus.",
-        source=ARGUED,
-        gt=0,
-        lt=1,
     )
     hot_spot_reach_m: float = quantity(
         0.02,

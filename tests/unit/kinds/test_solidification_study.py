@@ -14,20 +14,24 @@ import pytest
 import yaml
 from PIL import Image
 
+from sandmould import ROOT
 from sandmould.analysis.freezing import freezing
 from sandmould.bad_input import BadInputError
 from sandmould.casting.arpm import computation
 from sandmould.execution.simulate import export_run, measure_run, render_run, simulate
-from sandmould.report.page import write_report
+from sandmould.report.kinds.solidification import _fields
+from sandmould.report.page import _stand_ins, write_report
 from sandmould.runs import checkpoint_file
 from sandmould.runs.checkpoint_file import CheckpointFile
+from sandmould.runs.formatting import number
 from sandmould.runs.outcome import Outcome, RunOutcome
-from sandmould.scenario.casting.solidification import Solidification
+from sandmould.scenario.casting.solidification import MetalAndMould, Solidification
 from sandmould.study.collect import collect
 from sandmould.study.plan.expand import expand
 from sandmould.study.plan.load_study import open_study
-from sandmould.study.plan.plan_files import plan_table, read_run, write_study
+from sandmould.study.plan.plan_files import plan_table, read_run, write_run, write_study
 from sandmould.study.plan.price import Prices
+from sandmould.wording.answer import AnswerWords
 from tests.planned import write_plan
 
 SMALL: dict[str, Any] = {
@@ -241,6 +245,25 @@ def test_a_short_riser_leaves_a_plate_without_feed(tmp_path: Path) -> None:
     # a plate 20 mm thick and 30 mm high in sand is no thicker than one of 20 mm without end
     assert 0.004 < np.nanmax(fields["modulus_m"]) < 0.0102
     assert "cut_off_fraction" in (folder / "measures.tsv").read_text()
+    own = fields["melts"] & ~fields["riser"]
+    text = _fields(folder, read_run(folder / "scenario.yaml").scenario)[2][0]
+    first, risers = (np.nanmax(fields["frozen_s"][part]) for part in (own, fields["riser"]))
+    assert text.startswith(f"Last: the part is solid after {number(first)} s, last at x = ")
+    ending = f"; the risers are after {number(risers)} s." if risers > first else (
+        "; that is later than the risers.")  # fmt: skip
+    assert text.endswith(ending)
+
+
+def test_a_number_without_a_section_is_named_among_placeholders(tmp_path: Path) -> None:
+    (run,) = expand(open_study(ROOT / "config" / "studies" / "riser.yaml"))
+    write_plan([run], tmp_path)
+    write_run(run, tmp_path)
+    found = _stand_ins(tmp_path, [run.run], MetalAndMould)
+    assert found == ("initial_k.casting", "initial_k.mould", "heat_transfer_w_m2_k")
+    assert [AnswerWords._section(key) for key in found][1:] == [
+        "initial temperatures",
+        "heat transfer",
+    ]
 
 
 def test_a_run_that_ends_liquid_says_so(tmp_path: Path) -> None:
@@ -344,8 +367,8 @@ def test_touching_parts_are_one_casting(tmp_path: Path) -> None:
         BAR | {"low_m": [0.03, 0.04]},
     )
     found = []
-    for number, shapes in enumerate(([BAR], [low, high])):
-        folder = tmp_path / str(number)
+    for place, shapes in enumerate(([BAR], [low, high])):
+        folder = tmp_path / str(place)
         folder.mkdir()
         found.append((one_run(folder, shapes=shapes) / "series.tsv").read_bytes())
     assert found[0] == found[1]
