@@ -17,6 +17,15 @@ from sandmould.statistics.refining import Refining
 from sandmould.statistics.settings import Setting
 from sandmould.statistics.verdict import Verdict
 
+TIP = "pattern_tip_deflection_m"
+BENDING = (
+    TIP,
+    "pattern_largest_displacement_m",
+    "pattern_distance_largest_m",
+    "pattern_distance_rms_m",
+)
+"""Measures of how far a pattern is bent."""
+
 
 class Decided(StrEnum):
     """What the runs of a study say of its question."""
@@ -173,6 +182,12 @@ class Answer:
     def trades(self) -> bool:
         """Whether no setting suits all that the runs should do well."""
         return bool(self.wanted and self.beside) and not self.common
+
+    @property
+    def filled(self) -> float | None:
+        """Of a bending pattern's measure: its value at the best setting before it was shaken."""
+        bends = self.asked.measure in BENDING
+        return self.passage.first if self.passage and bends else None
 
     @property
     def still_changes(self) -> float:

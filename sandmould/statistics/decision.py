@@ -11,17 +11,16 @@ import pandas as pd
 from sandmould.runs.columns import OF_RUN, RUN
 from sandmould.runs.formatting import OF_BED, filled_space, is_number, setting_text
 from sandmould.scenario.drive import BoxDrive
-from sandmould.statistics.answer import Answer, Asked, Decided, SweepEnd
+from sandmould.statistics.answer import BENDING, TIP, Answer, Asked, Decided, SweepEnd
 from sandmould.statistics.config import Aim, Goal
 from sandmould.statistics.evidence import left_out_counts, one_way_runs, usable_values
-from sandmould.statistics.over_time import passage_of, reached_s
+from sandmould.statistics.over_time import Passage, passage_of, reached_s
 from sandmould.statistics.refining import Refining, refining_of, resolution_among
 from sandmould.statistics.settings import Setting, number_blocks, setting_rows
 from sandmould.statistics.verdict import Verdict, compare_settings, further_replicates
 
 _SAME = 1e-9
 """Values without chance that differ by less, as a share, are the same but for round-off."""
-TIP = "pattern_tip_deflection_m"
 
 
 @dataclass(frozen=True)
@@ -83,8 +82,11 @@ def _decide_one(asked: Asked, evidence: Evidence) -> Answer:
         is_run = _are_same_runs(summary, asked)
         return replace(answer, decided=Decided.NO_EFFECT if is_run else Decided.EQUAL)
     if asked.better == "neither":
-        several = len(answer.used) > 1
-        return replace(answer, decided=Decided.RANGE if several else Decided.VALUE)
+        if len(answer.used) > 1:
+            return replace(answer, decided=Decided.RANGE)
+        bends = asked.measure in BENDING
+        passage = _passage(answer, evidence, summary, answer.used[0]) if bends else None
+        return replace(answer, decided=Decided.VALUE, passage=passage)
     answer = _with_limits(answer, evidence, summary, errors)
     if asked.goal and asked.goal.measure in summary:
         answer = _with_target(answer, asked.goal, evidence, summary)
@@ -123,10 +125,16 @@ def _with_limits(
         table_ends=tuple(end for end in ends if evidence.table_limit_at(end)),
         further_runs=further_replicates(verdict.comparisons, best),
         numerical_error=None if None in known else sum(e for e in known if e is not None),
-        passage=passage_of(
-            evidence.curves, _runs(summary, answer.asked, best), answer.asked.measure
-        ),
+        passage=_passage(answer, evidence, summary, best),
     )
+
+
+def _passage(
+    answer: Answer, evidence: Evidence, summary: pd.DataFrame, setting: Setting
+) -> Passage | None:
+    """Of a setting over its vibration."""
+    runs = _runs(summary, answer.asked, setting)
+    return passage_of(evidence.curves, runs, answer.asked.measure)
 
 
 def _with_target(answer: Answer, goal: Goal, evidence: Evidence, summary: pd.DataFrame) -> Answer:

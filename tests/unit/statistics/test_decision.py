@@ -3,17 +3,20 @@
 from __future__ import annotations
 
 import math
+from dataclasses import replace
 
 import pandas as pd
 import pytest
 
 from sandmould.statistics.answer import Asked, Decided
-from sandmould.statistics.config import Aim
+from sandmould.statistics.config import Aim, Goal
 from sandmould.statistics.decision import Evidence, decide
 from sandmould.statistics.over_time import first_reach_s
 from sandmould.statistics.refining import Refining, refining_of, resolution_among
 from tests import answered
 from tests.answered import FILL, FREEZES, HOLE, HZ, POCKET, TIP, G, table
+
+BENT = "pattern_distance_largest_m"
 
 
 def labels(answer: answered.Answer) -> list[str]:
@@ -128,6 +131,34 @@ def test_what_should_be_small_and_grows_is_helped_by_no_longer_shaking() -> None
     found = answered.smaller_while_rising()
     assert found.still_changes > 0.08
     assert not found.longer_helps
+
+
+@pytest.mark.parametrize(
+    ("course_mm", "rest_mm", "changes"),
+    [
+        ((1.119, 0.682, 0.684, 0.7, 1.145), 0.99, 0.0),  # swings by as much as it rises
+        ((0.2, 0.21, 0.2, 0.21, 0.4), 0.2, 0.0),  # springs back at rest
+        ((0.2, 0.21, 0.2, 0.3, 0.4), 0.4, 0.4 / 0.3 - 1.0),
+        ((1.2, 0.9, 0.6, 0.5, 0.4), 0.4, 0.4 / 0.5 - 1.0),
+    ],
+)
+def test_a_rise_counts_beyond_what_a_measure_swings_by(
+    course_mm: tuple[float, ...], rest_mm: float, changes: float
+) -> None:
+    summary = pd.DataFrame([{"run": "a", "seed": 1, "outcome_code": 0, BENT: 1e-3 * rest_mm}])
+    times_s = (0.0, 0.25, 0.5, 0.75, 1.0, 1.0)
+    stages = ["vibrate_1"] * 5 + ["rest"]
+    rows = zip(times_s, stages, (*course_mm, rest_mm), strict=True)
+    curves = pd.DataFrame(
+        [{"run": "a", "vibration_time_s": t, "stage": s, BENT: 1e-3 * mm} for t, s, mm in rows]
+    )
+    asked = Asked(BENT, "smaller", (), Goal(BENT, 1e-4))
+    found = decide(asked, Evidence(summary, curves))
+    assert found.decided is Decided.NONE_REACHES
+    assert found.still_changes == pytest.approx(changes)
+    assert found.filled == pytest.approx(1e-3 * course_mm[0])
+    known = decide(replace(asked, better="neither", goal=None), Evidence(summary, curves))
+    assert (known.decided, known.filled) == (Decided.VALUE, found.filled)
 
 
 def test_runs_whose_loop_does_not_hold_never_count() -> None:
