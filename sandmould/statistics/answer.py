@@ -25,6 +25,7 @@ BENDING = (
     "pattern_distance_rms_m",
 )
 """Measures of how far a pattern is bent."""
+OUTSIDE = "pattern_outside_tolerance_fraction"
 
 
 class Decided(StrEnum):
@@ -98,6 +99,8 @@ class Answer:
     refining: Refining | None = None
     passage: Passage | None = None
     """Of the best setting over its vibration."""
+    outside: float | None = None
+    """Share of a bending pattern's surface beyond its tolerance at that setting, where known."""
     left_out: Mapping[str, int] = field(default_factory=dict)
     """Runs that do not count, by reason."""
     one_way: int = 0

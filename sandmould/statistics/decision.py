@@ -11,10 +11,10 @@ import pandas as pd
 from sandmould.runs.columns import OF_RUN, RUN
 from sandmould.runs.formatting import OF_BED, filled_space, is_number, setting_text
 from sandmould.scenario.drive import BoxDrive
-from sandmould.statistics.answer import BENDING, TIP, Answer, Asked, Decided, SweepEnd
+from sandmould.statistics.answer import BENDING, OUTSIDE, TIP, Answer, Asked, Decided, SweepEnd
 from sandmould.statistics.config import Aim, Goal
 from sandmould.statistics.evidence import left_out_counts, one_way_runs, usable_values
-from sandmould.statistics.over_time import Passage, passage_of, reached_s
+from sandmould.statistics.over_time import passage_of, reached_s
 from sandmould.statistics.refining import Refining, refining_of, resolution_among
 from sandmould.statistics.settings import Setting, number_blocks, setting_rows
 from sandmould.statistics.verdict import Verdict, compare_settings, further_replicates
@@ -84,9 +84,9 @@ def _decide_one(asked: Asked, evidence: Evidence) -> Answer:
     if asked.better == "neither":
         if len(answer.used) > 1:
             return replace(answer, decided=Decided.RANGE)
+        answer = replace(answer, decided=Decided.VALUE)
         bends = asked.measure in BENDING
-        passage = _passage(answer, evidence, summary, answer.used[0]) if bends else None
-        return replace(answer, decided=Decided.VALUE, passage=passage)
+        return _with_course(answer, evidence, summary, answer.used[0]) if bends else answer
     answer = _with_limits(answer, evidence, summary, errors)
     if asked.goal and asked.goal.measure in summary:
         answer = _with_target(answer, asked.goal, evidence, summary)
@@ -119,22 +119,26 @@ def _with_limits(
     assert best is not None
     ends = _ends(best, answer.used, answer.asked.keys)
     known = [errors.get(s.label) for s in (best, verdict.runner_up) if s is not None]
-    return replace(
+    answer = replace(
         answer,
         ends=tuple(end for end in ends if not evidence.table_limit_at(end)),
         table_ends=tuple(end for end in ends if evidence.table_limit_at(end)),
         further_runs=further_replicates(verdict.comparisons, best),
         numerical_error=None if None in known else sum(e for e in known if e is not None),
-        passage=_passage(answer, evidence, summary, best),
     )
+    return _with_course(answer, evidence, summary, best)
 
 
-def _passage(
+def _with_course(
     answer: Answer, evidence: Evidence, summary: pd.DataFrame, setting: Setting
-) -> Passage | None:
-    """Of a setting over its vibration."""
-    runs = _runs(summary, answer.asked, setting)
-    return passage_of(evidence.curves, runs, answer.asked.measure)
+) -> Answer:
+    """With how a setting went on over its vibration, and where that left a pattern."""
+    runs, measure = _runs(summary, answer.asked, setting), answer.asked.measure
+    outside = None
+    if measure in BENDING and OUTSIDE in summary:
+        known = summary.loc[summary[RUN].astype(str).isin(runs), OUTSIDE].dropna()
+        outside = float(known.mean()) if len(known) else None
+    return replace(answer, passage=passage_of(evidence.curves, runs, measure), outside=outside)
 
 
 def _with_target(answer: Answer, goal: Goal, evidence: Evidence, summary: pd.DataFrame) -> Answer:
