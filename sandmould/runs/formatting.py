@@ -217,8 +217,34 @@ def _text(value: Any) -> str:
     """A value that is no number: short ones in full, so that no two look alike."""
     text = json.dumps(value) if isinstance(value, list | dict | tuple) else str(value)
     if text[:1] in ("[", "{"):
-        return text if len(text) <= _LONGEST_LIST else f"no. {mark(text)}"
+        said = _sections_text(text)
+        shown = said if 0 < len(said) <= _LONGEST_LIST else text
+        return shown if len(shown) <= _LONGEST_LIST else f"no. {mark(text)}"
     return text.replace("_", " ")
+
+
+def _sections_text(text: str) -> str:
+    """A list of small sections in JSON: ``5 x 10 mm + 20 mm``; empty for any other value."""
+    try:
+        sections = json.loads(text)
+    except ValueError:
+        return ""
+    if not isinstance(sections, list) or not all(isinstance(each, dict) for each in sections):
+        return ""
+    values = [value for each in sections for value in each.values()]
+    if any(isinstance(value, list | dict) for value in values):
+        return ""
+    return " + ".join(map(_section_text, sections))
+
+
+def _section_text(section: Mapping[str, Any]) -> str:
+    often = f"{section['repeat']} x " if "repeat" in section else ""
+    stated = {k: v for k, v in section.items() if k != "repeat" and v is not None}
+    told = (
+        value_text(key, value) if unit_of(key) else f"{name_of(key)} {value_text(key, value)}"
+        for key, value in stated.items()
+    )
+    return often + " ".join(told)
 
 
 def range_text(key: str, low: float, high: float) -> str:
