@@ -59,11 +59,7 @@ class CondensedSurface:
 
 
 def condensed_surface(
-    stiffness: csc_array,
-    mass_kg: Array,
-    motion: csr_array,
-    fixed: Mask,
-    loose: int = 0,
+    stiffness: csc_array, mass_kg: Array, motion: csr_array, fixed: Mask, loose: int = 0
 ) -> CondensedSurface:
     """Schur complement on the nodes of a surface, exact for static loads on it (Guyan 1965).
 

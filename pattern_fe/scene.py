@@ -147,10 +147,11 @@ def _refuse_cluster(config: PatternConfig, dimension: int) -> None:
 def _supports(config: PatternConfig) -> Supports:
     """What holds the pattern; a ValueError where a free one is held by something else too."""
     given = config.supports
-    held = given.clamped or given.resting or given.hung or given.bedding_n_m3
+    ways = ("clamped", "resting", "hung", "bedding_n_m3")
+    held = [name for name in ways if getattr(given, name)]
     if given.free and held:
-        others = "clamped, resting, hung and bedding_n_m3"
-        raise ValueError(f"a free pattern is held by sand alone, valid is without {others}")
+        valid = f"valid is without {', '.join(held)}: [] or null for each"
+        raise ValueError(f"a free pattern is held by sand alone, {valid}")
     of_all = [body.supports for body in config.bodies]
     named = list(enumerate(of_all))
     return Supports(

@@ -38,10 +38,7 @@ def l_shape(thickness_m: float, height_m: float, reach_m: float) -> list[Rectang
     reach_m : float, m
         From the back of the stem to the tip of the flange.
     """
-    return [
-        (0.0, 0.0, thickness_m, height_m),
-        (0.0, height_m - thickness_m, reach_m, height_m),
-    ]
+    return [(0.0, 0.0, thickness_m, height_m), (0.0, height_m - thickness_m, reach_m, height_m)]
 
 
 def mesh_of(rectangles: Sequence[Rectangle], element_m: float, depth_m: float | None = None) -> Any:

@@ -20,7 +20,7 @@ FACTOR = "pattern.loop.factor"
 GUARD = "guard.kinetic_energy_factor"
 POCKET, HOLE = "pocket_fill_of_bed_fraction", "hole18_fill_of_bed_fraction"
 FILL, SHARE = "tube_fill_fraction", "tube_fill_of_bed_fraction"
-TIP = "pattern_tip_deflection_m"
+TIP, BENT = "pattern_tip_deflection_m", "pattern_distance_largest_m"
 FREEZES = "solidification_time_s"
 Values = Mapping[Any, Sequence[float]]
 
@@ -173,6 +173,20 @@ def _height(heights_mm: Values) -> Answer:
     )  # fmt: skip
 
 
+def a_bent_part() -> Answer:
+    """A part whose shaken surface swings and comes to rest farther from its drawing than passes."""
+    rest = {"stage": "rest", "vibration_time_s": 0.1, BENT: 0.988e-3}
+    shaken = [
+        {"stage": "vibrate_1", "vibration_time_s": 0.025 * n, BENT: 1e-3 * mm}
+        for n, mm in enumerate((1.119, 0.682, 0.684, 0.7, 1.145))
+    ]
+    curves = pd.DataFrame([*shaken, rest]).assign(run="r1")
+    run = {"run": "r1", "replicate": 1, "seed": 1, "outcome_code": 0, BENT: 0.988e-3}
+    summary = pd.DataFrame([run | {"pattern_outside_tolerance_fraction": 0.124}])
+    asked = Asked(BENT, "smaller", (), Goal(BENT, 5e-4))
+    return decide(asked, Evidence(summary, curves))
+
+
 def none_is_shown_to_reach() -> Answer:
     """A pocket and a hole that may be full at two settings of the table, at its limit."""
     at = [(28.0, 0.0012), (40.0, 0.00062), (15.0, 0.0012)]
@@ -193,5 +207,5 @@ QUESTIONS: Mapping[str, Callable[[], Answer]] = {
     each.__name__: each
     for each in (none_reaches, several_reach, best_at_an_end, two_cavities, one_value, no_chance,
                  finest, no_effect, smaller_while_rising, failing_loops, amplitude_swept, too_wide,
-                 by_chance, a_course, none_is_shown_to_reach)
+                 by_chance, a_course, a_bent_part, none_is_shown_to_reach)
 }  # fmt: skip

@@ -35,11 +35,7 @@ class Gain:
 
 
 def measure_gain(
-    session: SandSession,
-    body: ElasticBody,
-    surface: str,
-    displacement_m: Array,
-    window_s: float,
+    session: SandSession, body: ElasticBody, surface: str, displacement_m: Array, window_s: float
 ) -> Gain | None:
     """Compute a window twice, once led a little farther along the solution; the session stays.
 

@@ -13,6 +13,7 @@ from sandmould.pattern_fe.coupling.convergence_log import WindowEntry, force_n, 
 from sandmould.pattern_fe.coupling.in_step_foam import InStepFoam
 from sandmould.pattern_fe.coupling.pattern_session import SteppedSession
 from sandmould.runs.outcome import Outcome
+from sandmould.scenario.pattern import TOO_SOFT
 
 
 @dataclass(frozen=True)
@@ -59,7 +60,7 @@ class InStepSession(SteppedSession[InStepFoam]):
             raise EngineStop(
                 Outcome.COUPLING_DIVERGED,
                 f"the pattern has moved by {largest_m:.3g} m, more than pattern.loop."
-                f"largest_displacement_m allows, before {self.sand.time_s:.4g} s",
+                f"largest_displacement_m allows, before {self.sand.time_s:.4g} s: {TOO_SOFT}",
             )
         self._write(self.sand.steps - before)
 

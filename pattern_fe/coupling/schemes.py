@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 from typing import get_args
 
 from threadpoolctl import threadpool_limits
@@ -15,6 +14,7 @@ from sandmould.pattern_fe.coupling.contact_rows import ContactRows
 from sandmould.pattern_fe.coupling.explicit_foam import ContactBound, ExplicitFoam
 from sandmould.pattern_fe.coupling.gain_prediction import predicted_gain
 from sandmould.pattern_fe.coupling.in_step_foam import InStepFoam
+from sandmould.pattern_fe.coupling.selective_mass import LIKE_FOAM, selective_mass
 from sandmould.pattern_fe.pattern import Pattern
 from sandmould.pattern_fe.scene import surroundings_of
 from sandmould.scenario.pattern import Loop, Scheme
@@ -23,8 +23,6 @@ from sandmould.scenario.scenario import Scenario
 SCHEMES: tuple[Scheme, ...] = get_args(Scheme)
 ABOVE_VIBRATION = 5.0
 """Least ratio of the pattern's first frequency to that of the box, for a solution as if at rest."""
-LIKE_FOAM = 0.9
-"""Ratio of the pattern's first frequency to the foam's own from which on it moves like the foam."""
 
 
 def can_couple(scheme: Scheme, engine: Capabilities) -> bool:
@@ -138,21 +136,17 @@ def explicit_foam(scenario: Scenario, pattern: Pattern) -> ExplicitFoam:
         pattern swings with the box.
     """
     loop = _loop_of_small_displacements(scenario)
-    bound = ContactBound.of(scenario, pattern)
+    bound, around = ContactBound.of(scenario, pattern), surroundings_of(scenario, pattern)
     try:
         foam = ExplicitFoam(
-            pattern,
-            scenario.step_s,
-            bound,
-            loop.mass_scale,
-            loop.damping_ratio,
-            surroundings_of(scenario, pattern),
+            pattern, scenario.step_s, bound, loop.mass_scale, loop.damping_ratio, around
         )
     except ValueError as fault:
         raise _bad("mass_scale", loop.mass_scale, f"one that can be computed: {fault}") from fault
     shaken_hz = _shaken_hz(scenario)
     if foam.first_hz < ABOVE_VIBRATION * shaken_hz:
-        raise _swings(foam.mass_scale, foam.first_hz, shaken_hz)
+        swings = _swings(foam.mass_scale, foam.first_hz, shaken_hz)
+        raise _bad("scheme", loop.scheme, f"in_step, or a shorter time step: {swings}")
     return foam
 
 
@@ -177,20 +171,43 @@ def in_step_foam(scenario: Scenario, pattern: Pattern) -> InStepFoam:
             loop.damping_ratio,
             surroundings_of(scenario, pattern),
         )
-    mass, shaken_hz = foam.mass, _shaken_hz(scenario)
-    if loop.mass_scale is not None:
-        asked_hz = mass.own_first_hz / math.sqrt(loop.mass_scale)
-        if mass.first_hz < LIKE_FOAM * asked_hz:
-            valid = (
-                f"one at which contacts in a step of {scenario.step_s:.3g} s leave the pattern its "
-                f"first frequency, {asked_hz:.3g} Hz, not {mass.first_hz:.3g} Hz; a smaller "
-                "time_step.fraction, or null"
-            )
-            raise _bad("mass_scale", loop.mass_scale, valid)
-    if mass.first_hz < min(ABOVE_VIBRATION * shaken_hz, LIKE_FOAM * mass.own_first_hz):
-        also = f" or {LIKE_FOAM:g} times the foam's own {mass.own_first_hz:.3g} Hz"
-        raise _swings(mass.scale, mass.first_hz, shaken_hz, also)
+        mass, given = foam.mass, loop.mass_scale
+        least_hz = min(ABOVE_VIBRATION * _shaken_hz(scenario), LIKE_FOAM * mass.own_first_hz)
+        if mass.first_hz < least_hz:
+            raise BadInputError([_too_heavy(scenario, pattern, foam, least_hz)])
+    if given is not None and mass.scale > given:
+        valid = (
+            f"null, or at least {1.01 * mass.scale:.3g}, at which contacts in a time step of "
+            f"{scenario.step_s:.3g} s leave the pattern its first frequency"
+        )
+        raise _bad("mass_scale", given, valid)
     return foam
+
+
+def _too_heavy(scenario: Scenario, pattern: Pattern, foam: InStepFoam, least_hz: float) -> Problem:
+    """What lets a stepped pattern swing with the box, and a time step that does not."""
+    assert scenario.pattern is not None
+    given, mass = scenario.pattern.loop.mass_scale, foam.mass
+    key = "fraction" if scenario.time_step.step_s is None else "step_s"
+    step = asked = getattr(scenario.time_step, key)
+    first_hz = mass.first_hz if given is None else 0.0
+    while first_hz < least_hz:
+        # the masses that contacts ask for go with the step
+        step = float(f"{0.95 * step * (first_hz / least_hz) ** 2:.2g}") if first_hz else step
+        time_step = scenario.time_step.model_copy(update={key: step})
+        other = scenario.model_copy(update={"time_step": time_step})
+        contacts = ContactRows.of(other, pattern)
+        first_hz = selective_mass(pattern.condensed, contacts, other.step_s).first_hz
+    why = (
+        f"{_swings(mass.scale, mass.first_hz, _shaken_hz(scenario))} or {LIKE_FOAM:g} times the "
+        f"foam's own {mass.own_first_hz:.3g} Hz"
+    )
+    if given is not None:
+        return Problem(
+            "pattern.loop.mass_scale", given, f"null with time_step.{key} = {step:g}: {why}"
+        )
+    otherwise = "" if pattern.is_free else ", or another pattern.loop.scheme"
+    return Problem(f"time_step.{key}", asked, f"at most {step:g}{otherwise}: {why}")
 
 
 def _loop_of_small_displacements(scenario: Scenario) -> Loop:
@@ -208,13 +225,12 @@ def _shaken_hz(scenario: Scenario) -> float:
     return max((shaking.frequency_hz for shaking in shakings), default=0.0)
 
 
-def _swings(scale: float, first_hz: float, shaken_hz: float, also: str = "") -> BadInputError:
-    """Problem of scaled masses that let the pattern swing with the box."""
-    valid = (
-        f"a scale or a time step at which the pattern's first frequency, now {first_hz:.3g} Hz, "
-        f"is {ABOVE_VIBRATION:g} times the box's {shaken_hz:g} Hz{also}"
+def _swings(scale: float, first_hz: float, shaken_hz: float) -> str:
+    """How far a pattern's first frequency is from what the box asks of it."""
+    return (
+        f"at {scale:.3g} times the foam's mass the pattern's first frequency is {first_hz:.3g} Hz, "
+        f"below {ABOVE_VIBRATION:g} times the box's {shaken_hz:g} Hz"
     )
-    return _bad("mass_scale", round(scale, 1), valid)
 
 
 def _bad(key: str, value: object, valid: str) -> BadInputError:

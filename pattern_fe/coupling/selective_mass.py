@@ -23,6 +23,8 @@ STABLE_SHARE = 0.8
 """Of what central differences bear; the grains in contact bear the rest."""
 SLOWED = 0.01
 """Share by which the mass that goes with the stiffness may lower the first frequency."""
+LIKE_FOAM = 0.9
+"""Ratio of the first frequency to that of the scaled masses alone that a given scale must leave."""
 _PART = 1e-5
 """Least part that the elastic force has in M u / omega^-2."""
 _NEAR = 1.001
@@ -68,8 +70,8 @@ def selective_mass(
     surface : CondensedSurface
         With the pattern's own masses.
     scale : float, optional
-        Factor of the pattern's own masses; unless given the least from 1 on that leaves the
-        first frequency to them: the rest of M takes one hundredth of it at most.
+        Factor of the pattern's own masses, raised to the least that leaves ``LIKE_FOAM`` of the
+        first frequency to them; unless given the least from 1 on that leaves ``1 - SLOWED``.
 
     Raises
     ------
@@ -89,13 +91,13 @@ def selective_mass(
         left -= contacts.one_kg * float(((shape**2) / modal).sum(axis=1).max())
         return left > 0.0 and all(_positive(np.diag(left * modal) - row) for row in rows)
 
-    def most_s2(scale: float) -> float:
-        return 2.0 * SLOWED * scale / first
+    slowed = 2.0 * SLOWED if scale is None else LIKE_FOAM**-2 - 1.0
 
     def leaves_bending(scale: float) -> bool:
-        return most_s2(scale) > step_s**2 and bears(scale, most_s2(scale))
+        most_s2 = slowed * scale / first
+        return most_s2 > step_s**2 and bears(scale, most_s2)
 
-    chosen = _least(leaves_bending, 1.0) if scale is None else scale
+    chosen = _least(leaves_bending, 1.0 if scale is None else scale)
     # the elastic force is found as a part of M u: not so small a part that its digits are lost
     least_s2 = max(step_s**2, _PART * chosen / first)
     share_s2 = _least(lambda share_s2: bears(chosen, share_s2), least_s2)

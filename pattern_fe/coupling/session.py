@@ -30,7 +30,7 @@ from sandmould.pattern_fe.coupling.relaxation import (
 from sandmould.pattern_fe.large_displacement import LoadNotReachedError
 from sandmould.pattern_fe.surroundings import Surroundings
 from sandmould.runs.outcome import Outcome
-from sandmould.scenario.pattern import Loop
+from sandmould.scenario.pattern import TOO_SOFT, Loop
 
 Array = NDArray[np.float64]
 GOES_ON = 0.7
@@ -274,7 +274,7 @@ class CoupledSession(PatternSession):
                 Outcome.COUPLING_DIVERGED,
                 f"the pattern is to move by {largest_m:.3g} m, more than pattern.loop."
                 f"largest_displacement_m = {self._loop.largest_displacement_m:g}, after "
-                f"{self.sand.time_s:.4g} s: a smaller factor or another scheme may hold",
+                f"{self.sand.time_s:.4g} s: {TOO_SOFT}; or take a smaller factor or another scheme",
             )
 
     def _state(self) -> dict[str, Array]:

@@ -135,6 +135,7 @@ def _flag(option: str) -> str:
 def _placed(drawing: Path) -> dict[str, Any]:
     """Box, elements and gating for a part, or its mould."""
     from sandmould.geometry.mesh_file import read_surface  # slow to import
+    from sandmould.pattern_fe.nearest import nearest_on_facets
 
     unit_m = 1.0 if tells_unit(drawing) else 0.001
     try:
@@ -145,11 +146,12 @@ def _placed(drawing: Path) -> dict[str, Any]:
     low_m, high_m = corners_m.min(axis=(0, 1)), corners_m.max(axis=(0, 1))
     size_m = high_m - low_m
     position_m = _ROOM_M - low_m
-    # The gating holds the middle of the highest faces, or the face nearest to it.
+    # The gating holds the middle of the highest faces, or the place on them nearest to it.
     lowest_m = corners_m[:, :, 2].min(axis=1)
-    tops_m = corners_m[lowest_m >= lowest_m.max() - 1e-3 * size_m[2]].mean(axis=1)
-    nearest = np.linalg.norm(tops_m - tops_m.mean(axis=0), axis=1).argmin()
-    gate_m = tops_m[nearest] + position_m
+    tops_m = corners_m[lowest_m >= lowest_m.max() - 1e-3 * size_m[2]]
+    middle_m = 0.5 * (tops_m.min(axis=(0, 1)) + tops_m.max(axis=(0, 1)))
+    _, _, place_m = nearest_on_facets(middle_m[None], tops_m)
+    gate_m = place_m[0] + position_m
     half_m = np.array([_GATE_M, _GATE_M, 0.0005])
     element_m = max(round(float(size_m.min()) / _ELEMENTS, 4), 1e-4)
     cells = np.ceil((size_m + 2 * _ROOM_M) / element_m)

@@ -28,7 +28,7 @@ from sandmould.runs.formatting import number, setting_text
 from sandmould.runs.templates import sentences
 from sandmould.scenario.pattern import PatternDrawing
 from sandmould.scenario.scenario import Scenario
-from sandmould.statistics.decision import TIP
+from sandmould.statistics.answer import TIP
 from sandmould.statistics.evidence import left_out, usable_values
 from sandmould.statistics.settings import group_settings, setting_of
 from sandmould.statistics.verdict import Verdict

@@ -42,7 +42,7 @@ from sandmould.report.optimum import OptimumPages, effort_sentence, optimum_page
 from sandmould.report.pictured_runs import pictured_runs
 from sandmould.report.robustness import RobustnessPages
 from sandmould.report.tables import KeyNumber, data_files, key_numbers, runs_table, settings_table
-from sandmould.runs.columns import RUN, finished
+from sandmould.runs.columns import DETAIL, RUN, finished
 from sandmould.runs.files import replaced, write_text
 from sandmould.runs.formatting import name_of, setting_text
 from sandmould.runs.templates import Note, notes
@@ -294,8 +294,9 @@ def _first_screen(
         *of_kind.grounds,
         *([Note("Tests", robustness.sentences[0])] if robustness else []),
     )
-    lost = [str(run) for run in collected.summary.loc[~finished(collected.summary), RUN]]
-    steps = [*failed_steps(lost), *steps, *of_kind.steps, *certificate_steps(study, answer)]
+    lost = collected.summary[~finished(collected.summary)]
+    causes = dict(zip(lost[RUN].astype(str), lost[DETAIL].fillna("").astype(str), strict=True))
+    steps = [*failed_steps(causes), *steps, *of_kind.steps, *certificate_steps(study, answer)]
     if is_sound and study.seeks_best and not steps:
         steps.append(step("try"))
     owner = owner_of(page.study_folder)

@@ -38,6 +38,26 @@ _NAMES = {
     "pattern_tip_deflection_m": "deflection of the pattern's tip",
     "pattern_tip_filled_m": "deflection of the pattern's tip after filling",
     "pattern_tip_recovered_m": "deflection given back by vibration",
+    "pattern_tip_answered_m": "deflection of the pattern's tip at rest under its mean load",
+    "pattern_largest_displacement_m": "largest displacement of the pattern",
+    "pattern_distance_largest_m": "largest distance of the pattern from its drawing",
+    "pattern_distance_rms_m": "RMS distance of the pattern from its drawing",
+    "pattern_outside_tolerance_fraction": "share of the pattern's surface beyond its tolerance",
+    "pattern_pressure_above_pa": "pressure on what faces up of the pattern",
+    "pattern_pressure_below_pa": "pressure on what faces down of the pattern",
+    "pattern_von_mises_largest_pa": "largest von Mises stress of the pattern",
+    "pattern_compression_largest_pa": "largest compression of the pattern",
+    "pattern_crushed_fraction": "share of the foam that is crushed",
+    "pattern_support_x_n": "force of the supports on the pattern along x",
+    "pattern_support_y_n": "force of the supports on the pattern along y",
+    "pattern_support_z_n": "force of the supports on the pattern along z",
+    "pattern_work_j": "work of the sand on the pattern",
+    "pattern_energy_j": "energy in the pattern",
+    "pattern_stored_fraction": "energy in the pattern over the work of the sand on it",
+    "pattern_frequency_fraction": "first frequency of the pattern over its own",
+    "pattern_outside_fraction": "share of the wall time that the pattern took",
+    "pattern_loop_error_fraction": "error of the loop between sand and pattern",
+    "pattern_residual_fraction": "residual of the loop over the displacement",
     "pattern_under_fraction": "sand in the space under the pattern",
     "apparent_density_raw_kg_m3": "apparent density by the printed formula, Rojek 2004, eq. (55)",
     "apparent_density_corrected_kg_m3": "apparent density, corrected for walls",
@@ -197,8 +217,34 @@ def _text(value: Any) -> str:
     """A value that is no number: short ones in full, so that no two look alike."""
     text = json.dumps(value) if isinstance(value, list | dict | tuple) else str(value)
     if text[:1] in ("[", "{"):
-        return text if len(text) <= _LONGEST_LIST else f"no. {mark(text)}"
+        said = _sections_text(text)
+        shown = said if 0 < len(said) <= _LONGEST_LIST else text
+        return shown if len(shown) <= _LONGEST_LIST else f"no. {mark(text)}"
     return text.replace("_", " ")
+
+
+def _sections_text(text: str) -> str:
+    """A list of small sections in JSON: ``5 x 10 mm + 20 mm``; empty for any other value."""
+    try:
+        sections = json.loads(text)
+    except ValueError:
+        return ""
+    if not isinstance(sections, list) or not all(isinstance(each, dict) for each in sections):
+        return ""
+    values = [value for each in sections for value in each.values()]
+    if any(isinstance(value, list | dict) for value in values):
+        return ""
+    return " + ".join(map(_section_text, sections))
+
+
+def _section_text(section: Mapping[str, Any]) -> str:
+    often = f"{section['repeat']} x " if "repeat" in section else ""
+    stated = {k: v for k, v in section.items() if k != "repeat" and v is not None}
+    told = (
+        value_text(key, value) if unit_of(key) else f"{name_of(key)} {value_text(key, value)}"
+        for key, value in stated.items()
+    )
+    return often + " ".join(told)
 
 
 def range_text(key: str, low: float, high: float) -> str:

@@ -14,6 +14,11 @@ from sandmould.scenario.sand import ARGUED
 from sandmould.scenario.solids import DRAWING_FILE, DRAWING_HASH, DRAWING_UNIT
 
 ROJEK = "Rojek 2004, section 4.3"
+TOO_SOFT = (
+    "a part that bends so far may be too soft for this sand without support: support it, or pour "
+    "thinner layers"
+)
+"""What is likely where a coupled pattern runs away."""
 
 
 def _length(description: str) -> float:

@@ -114,13 +114,20 @@ def _is_sourced(value: Any) -> bool:
     }
 
 
-def _is_another_kind(value: Tree, below: Tree) -> bool:
-    """Whether a section states another kind than the one that it is laid over, whose keys go."""
-    return "kind" in value and "kind" in below and value["kind"] != below["kind"]
+def _starts_anew(value: Tree, below: Tree) -> bool:
+    """Whether a section excludes the one that it is laid over, whose keys go.
+
+    It states another kind; or either of two ways to hold a pattern is free, which no other goes
+    with.
+    """
+    if "kind" in value and "kind" in below:
+        return bool(value["kind"] != below["kind"])
+    free = value.get("free"), below.get("free")
+    return True in free and free[0] is not free[1]
 
 
 def merge(base: Tree, extra: Tree, origin: Origin, file: str, above: str = "") -> Tree:
-    """Lay one tree over another: mappings merge, lists, values and other kinds replace.
+    """Lay one tree over another: mappings merge, lists, values and what excludes replace.
 
     Parameters
     ----------
@@ -136,7 +143,7 @@ def merge(base: Tree, extra: Tree, origin: Origin, file: str, above: str = "") -
         key = f"{above}.{name}" if above else str(name)
         below = merged.get(name)
         lays_over = isinstance(value, dict) and not _is_sourced(value)
-        if not (lays_over and isinstance(below, dict)) or _is_another_kind(value, below):
+        if not (lays_over and isinstance(below, dict)) or _starts_anew(value, below):
             for table in (origin.file, origin.source):
                 for old in [k for k in table if k == key or k.startswith(key + ".")]:
                     del table[old]

@@ -190,4 +190,9 @@ def fault_of(error: Exception) -> str:
     problem = str(getattr(error, "problem", None))
     if "\\t" in problem:
         problem = "a tab stands there; YAML is indented with spaces"
+    if problem.startswith("mapping values"):
+        problem = (
+            "no key can stand before its last colon: put a text that holds ': ' in quotes, or "
+            "indent the line like those beside it"
+        )
     return f"line {mark.line + 1} cannot be read as YAML: {problem}"

@@ -17,6 +17,16 @@ from sandmould.statistics.refining import Refining
 from sandmould.statistics.settings import Setting
 from sandmould.statistics.verdict import Verdict
 
+TIP = "pattern_tip_deflection_m"
+BENDING = (
+    TIP,
+    "pattern_largest_displacement_m",
+    "pattern_distance_largest_m",
+    "pattern_distance_rms_m",
+)
+"""Measures of how far a pattern is bent."""
+OUTSIDE = "pattern_outside_tolerance_fraction"
+
 
 class Decided(StrEnum):
     """What the runs of a study say of its question."""
@@ -89,6 +99,8 @@ class Answer:
     refining: Refining | None = None
     passage: Passage | None = None
     """Of the best setting over its vibration."""
+    outside: float | None = None
+    """Share of a bending pattern's surface beyond its tolerance at that setting, where known."""
     left_out: Mapping[str, int] = field(default_factory=dict)
     """Runs that do not count, by reason."""
     one_way: int = 0
@@ -173,6 +185,12 @@ class Answer:
     def trades(self) -> bool:
         """Whether no setting suits all that the runs should do well."""
         return bool(self.wanted and self.beside) and not self.common
+
+    @property
+    def filled(self) -> float | None:
+        """Of a bending pattern's measure: its value at the best setting before it was shaken."""
+        bends = self.asked.measure in BENDING
+        return self.passage.first if self.passage and bends else None
 
     @property
     def still_changes(self) -> float:

@@ -11,7 +11,7 @@ import pandas as pd
 from sandmould.runs.columns import OF_RUN, RUN
 from sandmould.runs.formatting import OF_BED, filled_space, is_number, setting_text
 from sandmould.scenario.drive import BoxDrive
-from sandmould.statistics.answer import Answer, Asked, Decided, SweepEnd
+from sandmould.statistics.answer import BENDING, OUTSIDE, TIP, Answer, Asked, Decided, SweepEnd
 from sandmould.statistics.config import Aim, Goal
 from sandmould.statistics.evidence import left_out_counts, one_way_runs, usable_values
 from sandmould.statistics.over_time import passage_of, reached_s
@@ -21,7 +21,6 @@ from sandmould.statistics.verdict import Verdict, compare_settings, further_repl
 
 _SAME = 1e-9
 """Values without chance that differ by less, as a share, are the same but for round-off."""
-TIP = "pattern_tip_deflection_m"
 
 
 @dataclass(frozen=True)
@@ -83,8 +82,11 @@ def _decide_one(asked: Asked, evidence: Evidence) -> Answer:
         is_run = _are_same_runs(summary, asked)
         return replace(answer, decided=Decided.NO_EFFECT if is_run else Decided.EQUAL)
     if asked.better == "neither":
-        several = len(answer.used) > 1
-        return replace(answer, decided=Decided.RANGE if several else Decided.VALUE)
+        if len(answer.used) > 1:
+            return replace(answer, decided=Decided.RANGE)
+        answer = replace(answer, decided=Decided.VALUE)
+        bends = asked.measure in BENDING
+        return _with_course(answer, evidence, summary, answer.used[0]) if bends else answer
     answer = _with_limits(answer, evidence, summary, errors)
     if asked.goal and asked.goal.measure in summary:
         answer = _with_target(answer, asked.goal, evidence, summary)
@@ -117,16 +119,26 @@ def _with_limits(
     assert best is not None
     ends = _ends(best, answer.used, answer.asked.keys)
     known = [errors.get(s.label) for s in (best, verdict.runner_up) if s is not None]
-    return replace(
+    answer = replace(
         answer,
         ends=tuple(end for end in ends if not evidence.table_limit_at(end)),
         table_ends=tuple(end for end in ends if evidence.table_limit_at(end)),
         further_runs=further_replicates(verdict.comparisons, best),
         numerical_error=None if None in known else sum(e for e in known if e is not None),
-        passage=passage_of(
-            evidence.curves, _runs(summary, answer.asked, best), answer.asked.measure
-        ),
     )
+    return _with_course(answer, evidence, summary, best)
+
+
+def _with_course(
+    answer: Answer, evidence: Evidence, summary: pd.DataFrame, setting: Setting
+) -> Answer:
+    """With how a setting went on over its vibration, and where that left a pattern."""
+    runs, measure = _runs(summary, answer.asked, setting), answer.asked.measure
+    outside = None
+    if measure in BENDING and OUTSIDE in summary:
+        known = summary.loc[summary[RUN].astype(str).isin(runs), OUTSIDE].dropna()
+        outside = float(known.mean()) if len(known) else None
+    return replace(answer, passage=passage_of(evidence.curves, runs, measure), outside=outside)
 
 
 def _with_target(answer: Answer, goal: Goal, evidence: Evidence, summary: pd.DataFrame) -> Answer:

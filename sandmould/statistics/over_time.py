@@ -8,7 +8,7 @@ from dataclasses import dataclass
 
 import numpy as np
 import pandas as pd
-from numpy.typing import ArrayLike
+from numpy.typing import ArrayLike, NDArray
 
 from sandmould.runs.columns import RUN, STAGE, VIBRATION_TIME_S, during_vibration
 
@@ -25,24 +25,44 @@ class Passage:
     """At three quarters of the time."""
     last: float
     lasts_s: float
+    swing: float = 0.0
+    """What it goes back and forth by, the rest after the vibration among it."""
 
     @property
     def change(self) -> float:
-        """Share by which it changed in the last quarter; 0 where that is less than ``STILL``."""
-        change = self.last / self.late - 1.0 if self.late else 0.0
-        return change if abs(change) >= STILL else 0.0
+        """Share by which it changed in the last quarter; 0 where it is still but for its swing."""
+        return self._moved if abs(self._moved) >= STILL and not self.swings else 0.0
+
+    @property
+    def swings(self) -> bool:
+        """Whether it moves at the end, by no more than it swings."""
+        beyond = abs(self.last - self.late) - self.swing
+        return abs(self._moved) >= STILL and beyond < STILL * abs(self.late)
+
+    @property
+    def _moved(self) -> float:
+        return self.last / self.late - 1.0 if self.late else 0.0
 
 
 def passage_of(curves: pd.DataFrame, runs: Iterable[str], measure: str) -> Passage | None:
     """A measure of some runs over their vibration; None where no run tells."""
-    shaken = _shaken(curves, runs, measure)
+    runs = list(runs)
     passages = []
-    for _, run in shaken.groupby(RUN):
+    for name, run in _shaken(curves, runs, measure).groupby(RUN):
         time_s, value = (run[c].to_numpy(dtype=np.float64) for c in (VIBRATION_TIME_S, measure))
         if len(time_s) > 3 and np.isfinite(value).all():
             late = float(np.interp(0.75 * time_s[-1], time_s, value))
-            passages.append((float(value[0]), late, float(value[-1]), float(time_s[-1])))
+            own = curves[(curves[RUN] == name) & (curves[VIBRATION_TIME_S] >= 0)][measure].dropna()
+            swing = _swing(own.to_numpy(dtype=np.float64))
+            passages.append((float(value[0]), late, float(value[-1]), float(time_s[-1]), swing))
     return Passage(*np.mean(passages, axis=0).tolist()) if passages else None
+
+
+def _swing(course: NDArray[np.float64]) -> float:
+    """The lesser of the largest fall and the largest rise of a course: 0 of one that only rises."""
+    fall = (np.maximum.accumulate(course) - course).max()
+    rise = (course - np.minimum.accumulate(course)).max()
+    return float(min(fall, rise))
 
 
 def reached_s(curves: pd.DataFrame, runs: Iterable[str], measure: str, level: float) -> float:

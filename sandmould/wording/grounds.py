@@ -7,7 +7,7 @@ from collections.abc import Mapping, Sequence
 
 from sandmould.definition.certificate import frequency_key
 from sandmould.definition.study import Study
-from sandmould.kinds.sand.narrow import narrow_spaces
+from sandmould.kinds.sand.narrow import narrow_spaces, thin_walls
 from sandmould.kinds.sand.table_motion import throws_no_sand
 from sandmould.runs.formatting import display_number
 from sandmould.runs.templates import Note, notes
@@ -59,6 +59,14 @@ def sand_grounds(
         sand=study.certificate.sand_wave_speed,
         hold=vibrations[0].hold if vibrations else "",
         narrow=narrow_spaces(scenario),
+        walls=thin_walls(scenario),
+        beddings_n_m3=sorted(
+            {
+                bedding_n_m3
+                for each in (scenario, *by_setting.values())
+                if each.pattern and (bedding_n_m3 := each.pattern.supports.bedding_n_m3)
+            }
+        ),
         scale=scenario.sand.size_scale,
         of_grains=of_grains,
         weak=[label for label, each in by_setting.items() if throws_no_sand(each)],

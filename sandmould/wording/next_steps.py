@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 
 from sandmould.definition.certificate import frequency_key
@@ -66,14 +66,15 @@ def with_file(steps: Sequence[NextStep], owner: str | None, shipped: str, name: 
     return NextSteps(tuple(steps), where if has_lines else "", command)
 
 
-def failed_steps(runs: Sequence[str]) -> list[NextStep]:
-    """What runs that did not finish ask for."""
-    if not runs:
+def failed_steps(causes: Mapping[str, str]) -> list[NextStep]:
+    """What runs that did not finish ask for, by their causes as the runs state them."""
+    if not causes:
         return []
+    runs = list(causes)
     names = " ".join(runs) if len(runs) <= 2 else f"{runs[0]} ..."
-    one = len(runs) == 1
-    said, them = ("a run", "it") if one else (f"{len(runs)} runs", "them")
-    return [step("again", command=f"sandmould again {names}", runs=said, them=them)]
+    told = next((" ".join(cause.split()) for cause in causes.values() if cause), "")
+    command = f"sandmould again {names}"
+    return [step("again", command=command, runs=len(runs), cause=told.rstrip("."))]
 
 
 def answer_steps(study: Study, answer: Answer) -> list[NextStep]:

@@ -1,15 +1,23 @@
-"""Spaces that are too narrow for the grains: sand jams in them whatever the table does."""
+"""Spaces too narrow for the grains, where sand jams, and walls too thin to hold them back."""
 
 from __future__ import annotations
 
+import contextlib
 import math
 from dataclasses import dataclass
 
+import numpy as np
+
+from sandmould.bad_input import BadInputError
 from sandmould.geometry.geometry import Revolved
+from sandmould.geometry.mesh import TriangleMesh
+from sandmould.geometry.outline import Outline
 from sandmould.runs.formatting import rounded
 from sandmould.scenario.box import Tube
-from sandmould.scenario.checks.wall_thickness import thinnest_wall
+from sandmould.scenario.checks.wall_thickness import ThinWall, thinnest_wall
+from sandmould.scenario.pattern import PatternDrawing
 from sandmould.scenario.scenario import Scenario
+from sandmould.scenario.solids import drawn_surface
 
 LEAST_GRAINS = 5.0
 """Of the largest diameter: in narrower spaces a few grains form an arch and stop the others."""
@@ -53,3 +61,34 @@ def narrow_spaces(scenario: Scenario) -> list[Narrow]:
         Narrow(names, width_m, largest_m, math.floor(10 * scale * width_m) / 10)
         for width_m, names in alike.items()
     ]
+
+
+@dataclass(frozen=True)
+class Thin:
+    """A solid with a wall thinner than the smallest grain."""
+
+    name: str
+    wall: ThinWall
+    smallest_m: float
+    """Diameter of the smallest grain."""
+
+
+def thin_walls(scenario: Scenario) -> list[Thin]:
+    """Solids through whose thinnest wall grains may pass."""
+    smallest_m = scenario.sand.classes(scenario.dimension)[0].diameter_m
+    solids: list[Outline | TriangleMesh] = [*scenario.scene.outlines, *scenario.scene.meshes]
+    walls = {s.name: thinnest_wall([_as_drawn(scenario, s)], smallest_m) for s in solids}
+    return [Thin(name, wall, smallest_m) for name, wall in walls.items() if wall]
+
+
+def _as_drawn(scenario: Scenario, solid: Outline | TriangleMesh) -> Outline | TriangleMesh:
+    """A solid, a drawn pattern by its drawing: its elements cut corners."""
+    pattern = scenario.pattern
+    if pattern is None or solid.name != pattern.name:
+        return solid
+    if not isinstance(pattern.shape, PatternDrawing) or pattern.others:
+        return solid
+    with contextlib.suppress(BadInputError):  # gone or changed since it was planned
+        drawn_m, triangles = drawn_surface(pattern.shape, "pattern.shape")
+        return TriangleMesh(solid.name, drawn_m + np.array(pattern.position_m), triangles)
+    return solid

@@ -7,18 +7,15 @@ from typing import Any
 import numpy as np
 
 from sandmould.engines import registry
-from sandmould.geometry.mesh import TriangleMesh
-from sandmould.geometry.outline import Outline
 from sandmould.kernel_cache import are_compiled
-from sandmould.kinds.sand.narrow import narrow_spaces
+from sandmould.kinds.sand.narrow import narrow_spaces, thin_walls
 from sandmould.runs import templates
 from sandmould.runs.templates import Note
 from sandmould.scenario.cavities import MeshCavity
-from sandmould.scenario.checks.wall_thickness import thinnest_wall
 from sandmould.scenario.hardness import LEAST_KAPPA, bed_hardness
 from sandmould.scenario.pattern import PatternDrawing
 from sandmould.scenario.scenario import Scenario
-from sandmould.scenario.solids import SolidMesh, drawn_part, drawn_surface
+from sandmould.scenario.solids import SolidMesh, drawn_part
 
 HIGH_ACCELERATION_G = 20.0
 """Peak acceleration above which a plan asks whether the amplitude is meant so."""
@@ -29,11 +26,6 @@ EPYC with AVX2, idle)."""
 
 def notes(scenario: Scenario) -> tuple[Note, ...]:
     """How stiff the grains are, spaces and walls thinner than they allow, and drawings."""
-    smallest_m = scenario.sand.classes(scenario.dimension)[0].diameter_m
-    solids: list[Outline | TriangleMesh] = [*scenario.scene.outlines, *scenario.scene.meshes]
-    walls = {
-        solid.name: thinnest_wall([_as_drawn(scenario, solid)], smallest_m) for solid in solids
-    }
     box_m = np.array(scenario.box.size_m(scenario.dimension))
     places = {"obstacles": scenario.obstacles, "cavities": scenario.cavities}
     drawn = {
@@ -54,8 +46,7 @@ def notes(scenario: Scenario) -> tuple[Note, ...]:
             for stage in scenario.vibrations
             if stage.unbalance is None and stage.peak_acceleration_g > HIGH_ACCELERATION_G
         ],
-        walls={name: wall for name, wall in walls.items() if wall},
-        smallest_m=smallest_m,
+        walls=thin_walls(scenario),
         drawings=drawn,
         hollows={
             f"cavities.{n}": scenario.scene.cavities[n].space
@@ -65,17 +56,6 @@ def notes(scenario: Scenario) -> tuple[Note, ...]:
         edges=scenario.engine.name == "liggghts" and bool(scenario.scene.meshes),
         **_of_pattern(scenario),
     )
-
-
-def _as_drawn(scenario: Scenario, solid: Outline | TriangleMesh) -> Outline | TriangleMesh:
-    """A solid, a drawn pattern by its drawing: its elements cut corners."""
-    pattern = scenario.pattern
-    if pattern is None or solid.name != pattern.name:
-        return solid
-    if not isinstance(pattern.shape, PatternDrawing) or pattern.others:
-        return solid
-    drawn_m, triangles = drawn_surface(pattern.shape, "pattern.shape")
-    return TriangleMesh(solid.name, drawn_m + np.array(pattern.position_m), triangles)
 
 
 def _of_pattern(scenario: Scenario) -> dict[str, Any]:

@@ -7,6 +7,7 @@ from pathlib import Path
 from typing import Any
 
 import pytest
+import trimesh
 import yaml
 from typer.testing import CliRunner, Result
 
@@ -144,6 +145,14 @@ def test_a_part_of_foam_hangs_in_the_sand_by_its_top() -> None:
     # its top lies 8 mm over the origin of the drawing
     assert (gate.low_m[2], gate.high_m[2]) == (0.0455, 0.0465)
     assert scenario.vibration[0].displacement_m == 0.0004
+
+
+@pytest.mark.slow
+def test_a_block_hangs_by_the_middle_of_its_top() -> None:
+    trimesh.creation.box(extents=(80.0, 60.0, 20.0)).export("block.stl")
+    _, plan = written("part", "--drawing", "block.stl")
+    (gate,) = plan.runs[0].scenario.pattern.supports.hung
+    assert (gate.low_m[:2], gate.high_m[:2]) == ((0.06, 0.05), (0.08, 0.07))
 
 
 @pytest.mark.parametrize(

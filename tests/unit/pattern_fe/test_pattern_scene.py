@@ -126,11 +126,14 @@ def test_a_pattern_that_cannot_be_computed_is_told(pattern: dict[str, Any], says
         ({}, {"engine": {"name": "lammps"}}, "pattern.loop.scheme = 'monolithic' .* on engine lam"),
         ({"statics": "large"}, {}, "pattern.loop.scheme = 'monolithic' .* pattern.statics = large"),
         ({"loop": {"scheme": "monolithic", "mass_scale": 1.0}}, {}, "contacts would throw its li"),
-        ({}, {"vibration": [{"acceleration_g": 1.0}]}, "pattern's first frequency, now .* Hz, is"),
+        ({}, {"vibration": [{"acceleration_g": 1.0}]}, "in_step, or a sho.* first fr"),
         ({"loop": {"scheme": "in_step"}, "statics": "large"}, {}, "scheme = 'in_step' .* = large"),
-        ({"loop": {"scheme": "in_step", "mass_scale": 1e-3}}, {}, "mass_scale = .* leave the pat"),
+        ({"loop": {"scheme": "in_step", "mass_scale": 1e-3}}, {}, "null, or at least 3.89, at whi"),
+        ({"loop": {"scheme": "in_step", "mass_scale": 1.01}, "supports": {"free": True},
+          "position_m": [0.06, 0.05]}, {}, "mass_scale = 1.01 .* null, or at least 5.0"),
         ({"loop": {"scheme": "in_step", "mass_scale": 1e4}},
-         {"vibration": [{"acceleration_g": 1.0}]}, "50 Hz or 0.9 times the foam's own"),
+         {"vibration": [{"acceleration_g": 1.0}]},
+         "mass_scale = 1.* null with time_step.fraction = 0.* 50 Hz or 0.9 times the foam's own"),
     ],
 )  # fmt: skip
 def test_what_a_scheme_lacks_is_told(
@@ -148,6 +151,22 @@ def test_a_pattern_that_swings_like_the_foam_may_be_shaken() -> None:
         quick = {"time_step": {"fraction": 0.05}, "engine": {"name": engine}}
         scene = {**L_SCENE, "pattern": told, **shaken, **quick}
         with_surface(Scenario.model_validate(scene))
+
+
+@pytest.mark.parametrize(("key", "value"), [("fraction", 0.7), ("step_s", 1e-6)])
+def test_a_time_step_that_swings_the_pattern_names_one_that_does_not(
+    key: str, value: float
+) -> None:
+    told = {"supports": {"free": True}, "position_m": [0.06, 0.05], "loop": {"scheme": "in_step"}}
+    shaken = [{"acceleration_g": 1.0, "frequency_hz": 150.0}]
+    scene = {**L_SCENE, "pattern": {**L_SCENE["pattern"], **told}, "vibration": shaken}
+    with pytest.raises(BadInputError) as refused:
+        with_surface(Scenario.model_validate({**scene, "time_step": {key: value}}))
+    (problem,) = refused.value.problems
+    assert (problem.key, problem.value) == (f"time_step.{key}", value)
+    named = float(problem.valid.removeprefix("at most ").partition(":")[0])
+    assert named > 0.1 * value
+    with_surface(Scenario.model_validate({**scene, "time_step": {key: named}}))
 
 
 SPACE: dict[str, Any] = {"dimension": 3, "box": {"depth_m": 0.08}, "engine": {"name": "reference"}}

@@ -5,6 +5,7 @@ from __future__ import annotations
 import os
 from collections.abc import Callable
 from pathlib import Path
+from typing import Any
 
 import pytest
 
@@ -128,6 +129,16 @@ def test_a_pipe_and_a_text_nested_without_end_are_sentences(
     os.mkfifo(path)
     with pytest.raises(BadInputError, match="file = 'it is no plain file' cannot be used"):
         read_file(path, "trial.yaml")
+
+
+@pytest.mark.parametrize("before", [{"free": True}, {"hung": [1], "bedding_n_m3": 2.0}])
+@pytest.mark.parametrize("after", [{"free": True}, {"hung": [3]}, {"clamped": []}])
+def test_a_pattern_that_becomes_free_or_held_starts_its_supports_anew(
+    before: dict[str, Any], after: dict[str, Any]
+) -> None:
+    both = merge({"supports": before}, {"supports": after}, Origin(), "own")
+    is_anew = "free" in {*before, *after} and before != after
+    assert both["supports"] == (after if is_anew else {**before, **after})
 
 
 def test_another_kind_starts_a_section_anew() -> None:

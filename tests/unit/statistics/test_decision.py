@@ -3,17 +3,18 @@
 from __future__ import annotations
 
 import math
+from dataclasses import replace
 
 import pandas as pd
 import pytest
 
 from sandmould.statistics.answer import Asked, Decided
-from sandmould.statistics.config import Aim
+from sandmould.statistics.config import Aim, Goal
 from sandmould.statistics.decision import Evidence, decide
 from sandmould.statistics.over_time import first_reach_s
 from sandmould.statistics.refining import Refining, refining_of, resolution_among
 from tests import answered
-from tests.answered import FILL, FREEZES, HOLE, HZ, POCKET, TIP, G, table
+from tests.answered import BENT, FILL, FREEZES, HOLE, HZ, POCKET, TIP, G, table
 
 
 def labels(answer: answered.Answer) -> list[str]:
@@ -128,6 +129,38 @@ def test_what_should_be_small_and_grows_is_helped_by_no_longer_shaking() -> None
     found = answered.smaller_while_rising()
     assert found.still_changes > 0.08
     assert not found.longer_helps
+
+
+@pytest.mark.parametrize(
+    ("course_mm", "rest_mm", "changes"),
+    [
+        ((0.2, 0.21, 0.2, 0.21, 0.4), 0.2, 0.0),  # springs back at rest
+        ((0.2, 0.21, 0.2, 0.3, 0.4), 0.4, 0.4 / 0.3 - 1.0),
+        ((1.2, 0.9, 0.6, 0.5, 0.4), 0.4, 0.4 / 0.5 - 1.0),
+    ],
+)
+def test_a_rise_counts_beyond_what_a_measure_swings_by(
+    course_mm: tuple[float, ...], rest_mm: float, changes: float
+) -> None:
+    summary = pd.DataFrame([{"run": "a", "seed": 1, "outcome_code": 0, BENT: 1e-3 * rest_mm}])
+    times_s = (0.0, 0.25, 0.5, 0.75, 1.0, 1.0)
+    stages = ["vibrate_1"] * 5 + ["rest"]
+    rows = zip(times_s, stages, (*course_mm, rest_mm), strict=True)
+    curves = pd.DataFrame(
+        [{"run": "a", "vibration_time_s": t, "stage": s, BENT: 1e-3 * mm} for t, s, mm in rows]
+    )
+    asked = Asked(BENT, "smaller", (), Goal(BENT, 1e-4))
+    found = decide(asked, Evidence(summary, curves))
+    assert found.decided is Decided.NONE_REACHES
+    assert found.still_changes == pytest.approx(changes)
+    known = decide(replace(asked, better="neither", goal=None), Evidence(summary, curves))
+    assert (known.decided, known.filled) == (Decided.VALUE, 1e-3 * course_mm[0])
+
+
+def test_a_part_that_swings_by_what_it_rises_is_not_still_rising() -> None:
+    found = answered.a_bent_part()
+    assert (found.decided, found.still_changes) == (Decided.NONE_REACHES, 0.0)
+    assert (found.filled, found.outside) == (pytest.approx(1.119e-3), 0.124)
 
 
 def test_runs_whose_loop_does_not_hold_never_count() -> None:

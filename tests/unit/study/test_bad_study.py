@@ -58,6 +58,11 @@ CASES: dict[str, tuple[str | bytes, str]] = {
         "trial.yaml: sweep.keys.vibration.0.frequency_hz = 0 cannot be used: "
         "valid is a number of at least 0.1.",
     ),
+    "title with a colon": (
+        "based_on: tube\ntitle: Sand: how far?",
+        "trial.yaml: line 2 cannot be read as YAML: no key can stand before its last colon: put a "
+        "text that holds ': ' in quotes, or indent the line like those beside it.",
+    ),
     "swept range upside down": (
         "based_on: tube\nsweep: {keys: {sand.size_scale: {low: 6, high: 4, number: 3}}}",
         "trial.yaml: sweep.keys.sand.size_scale = {'low': 6, 'high': 4, 'number': 3} cannot be "

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 import re
 from pathlib import Path
 from typing import Any
@@ -60,3 +61,12 @@ def test_a_setting_names_sections_of_keys_that_end_alike() -> None:
 
 def test_values_of_a_table_read_like_those_of_a_study() -> None:
     assert setting_text({"relaxations": np.int64(5)}) == setting_text({"relaxations": 5})
+
+
+def test_a_list_of_small_sections_is_read_as_it_is_said() -> None:
+    layers = [{"height_m": 0.01, "repeat": 5}, {"height_m": 0.02}, {"count": 60}]
+    assert setting_text({"fill.layers": layers}) == "layers 5 x 10 mm + 20 mm + count 60"
+    # as a table holds it
+    assert setting_text({"fill.layers": json.dumps(layers[:1])}) == "layers 5 x 10 mm"
+    assert " no. " in setting_text({"fill.layers": 9 * layers})
+    assert setting_text({"shapes": [{"at_m": [1, 2]}]}) == 'shapes [{"at_m": [1, 2]}]'

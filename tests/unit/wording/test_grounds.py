@@ -3,7 +3,9 @@
 from __future__ import annotations
 
 from sandmould.kinds.sand.kind import SandStudy
+from sandmould.pattern_fe.coupling.interface import with_surface
 from sandmould.wording.grounds import sand_grounds, scatter_grounds
+from tests.unit.pattern_fe.test_pattern_scene import l_scene
 from tests.unit.report.test_answer import CLEAR, KEY, judged, summary
 from tests.unit.report_study import scenario
 
@@ -33,6 +35,22 @@ def test_a_best_frequency_rests_on_these_grounds() -> None:
         "voids than real sand.\n"
         "Below 1 g: at 0.5 g the box never throws the sand: expect little there."
     )
+
+
+def test_walls_thinner_than_grains_and_a_bedding_are_grounds() -> None:
+    supports = {"bedding_n_m3": 3e6}
+    scene = with_surface(l_scene(supports=supports))
+    coarse = scene.sand.model_copy(update={"size_scale": 80.0})
+    verdict = judged(summary(CLEAR)).verdict
+    of_fine, of_coarse = (
+        {note.about: note.text for note in sand_grounds(each, SandStudy(), verdict, {})}
+        for each in (scene, scene.model_copy(update={"sand": coarse}))
+    )
+    assert "springs of 3\u202f000\u202f000 N/m³ hold the part" in of_fine["Bedding"]
+    assert "Walls of pattern" not in of_fine
+    said = of_coarse["Walls of pattern"]
+    assert said.startswith("the thinnest measures 10.0 mm, at (")
+    assert "Grains may pass through this wall" in said
 
 
 def test_one_run_says_nothing_about_chance() -> None:
