@@ -206,11 +206,9 @@ class Result:
         stored = stored_snapshots(self._place(run))
         upto = [each for each in stored if time_s is None or each.times_s()[0] <= time_s]
         if not upto:
-            valid = (
-                f"at least {stored[0].times_s()[0]:g} s"
-                if stored
-                else "a run with snapshots of sand"
-            )
+            if not stored:
+                raise BadInputError([Problem("run", run, "a run of sand, which has snapshots")])
+            valid = f"at least {stored[0].times_s()[0]:g} s"
             raise BadInputError([Problem("time_s", time_s, valid)])
         return upto[-1].load()
 

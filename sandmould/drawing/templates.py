@@ -7,7 +7,7 @@ from jinja2.sandbox import ImmutableSandboxedEnvironment
 
 from sandmould import SHIPPED
 from sandmould.kept_templates import kept_templates
-from sandmould.runs.formatting import number
+from sandmould.runs.formatting import number, opened
 
 TEMPLATES = SHIPPED / "templates" / "report"
 
@@ -22,5 +22,5 @@ def page_environment() -> Environment:
         trim_blocks=True,
         lstrip_blocks=True,
     )
-    environment.filters["number"] = number
+    environment.filters |= {"number": number, "opened": opened}
     return environment

@@ -6,7 +6,7 @@ import difflib
 from collections.abc import Sequence
 from pathlib import Path
 
-from sandmould.bad_input import BadInputError, Problem
+from sandmould.bad_input import BadInputError, Problem, display_path
 from sandmould.definition.run import FILLS
 from sandmould.execution.locks import is_locked
 from sandmould.plain_file import UNREADABLE
@@ -46,7 +46,8 @@ def forget(names: Sequence[str], results: Path) -> list[Path]:
     for folder in folders:
         study = folder.parent.parent
         if study in plans and folder.name not in plans[study]:
-            valid = f"a run that {studies[study]} still leads to"
+            file = display_path(studies[study])
+            valid = f"a run that {file} still leads to: sandmould run {file} computes what is new"
             problems.append(Problem("RUN", folder.name, valid))
         elif is_locked(folder):
             problems.append(Problem("RUN", folder.name, "a run that is not being computed"))

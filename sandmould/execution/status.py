@@ -10,7 +10,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, Literal
 
-from sandmould.bad_input import BadInputError
+from sandmould.bad_input import BadInputError, display_path
 from sandmould.definition.run import Run
 from sandmould.execution.cluster.driver import driver_lines
 from sandmould.execution.cluster.queue import Job, Outlook, jobs_of, live_jobs, outlook, queue_lines
@@ -204,7 +204,7 @@ def _orphans(plan: Plan, results: Path) -> list[str]:
         return []
     size = size_text(freed_bytes(found))
     lines = [f"{len(found)} run folders of {size} no longer belong to the study; sandmould tidy "
-        f"{plan.study.name} removes them"]  # fmt: skip
+        f"{display_path(plan.study.path)} removes them"]  # fmt: skip
     lines += [f"  {folder.name}" for folder in found[:LISTED_RUNS]]
     return lines + ([f"  and {len(found) - LISTED_RUNS} more"] if len(found) > LISTED_RUNS else [])
 

@@ -100,6 +100,10 @@ class Planning(ABC, Generic[ScenarioT]):
         """A resolved scenario with another seed."""
         return scenario.model_copy(update={"seed": seed})
 
+    def takes_seed(self, scenario: ScenarioT) -> bool:
+        """Whether replicates, which differ in their seeds, can differ at all."""
+        return True
+
     def problems(self, scenario: ScenarioT) -> list[Problem]:
         """What keeps a well-typed scenario from being run."""
         return []

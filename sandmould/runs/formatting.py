@@ -135,6 +135,11 @@ def titled(key: str) -> str:
     return f"{name_of(key)}, {unit}" if unit else name_of(key)
 
 
+def opened(text: str) -> str:
+    """A text that begins a sentence: the first letter is large, units stay as they are."""
+    return text[:1].upper() + text[1:]
+
+
 def number(value: Any, digits: int = 3) -> str:
     """A number with so many significant digits, without an exponent where it can be helped."""
     try:

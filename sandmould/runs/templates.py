@@ -13,6 +13,7 @@ from sandmould.runs.formatting import (
     listed,
     name_of,
     number,
+    opened,
     range_text,
     rounded,
     seconds,
@@ -45,7 +46,7 @@ def _environment() -> Environment:
         undefined=StrictUndefined,
         bytecode_cache=kept_templates(),
     )
-    filters = (listed, number, rounded, seconds)
+    filters = (listed, number, opened, rounded, seconds)
     environment.filters |= {it.__name__: it for it in filters} | {"name": name_of}
     called = (display_number, display_range, range_text, value_text, with_margin)
     environment.globals |= {it.__name__: it for it in called}

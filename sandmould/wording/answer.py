@@ -116,6 +116,8 @@ class Span:
     last: tuple[str, str] = ("", "")
     steepest: tuple[str, str] = ("", "")
     """Labels between which it changes most, where that is more than chance."""
+    apart: str = ""
+    """By how much the highest differs from the lowest, where that is tested."""
 
 
 @dataclass(frozen=True)
@@ -334,18 +336,29 @@ class AnswerWords:
             return self.value(s.mean, s.ci_half_width), s.label
 
         low, high = (told(f(used, key=lambda s: s.mean)) for f in (min, max))
+        against = self.answer.verdict.against(max(used, key=lambda s: s.mean))
+        apart = ""
+        if against is not None and against.tested:
+            half = (against.ci[1] - against.ci[0]) / 2.0
+            apart = self.value(abs(against.difference), half)
         if not self.is_scale or len(used) < 4:
-            return Span(low, high)
+            return Span(low, high, apart=apart)
         first = next(i for i, s in enumerate(used) if abs(s.mean) >= NOTHING * largest)
         if 0 < first < len(used) - 1:
             at = told(used[first]), told(used[-1])
             return Span(low, high, used[first - 1].label, *at)
-        pairs = itertools.pairwise(used)
-        before, after = max(pairs, key=lambda pair: abs(pair[1].mean - pair[0].mean))
-        by_chance = before.ci_half_width + after.ci_half_width if self.asked.by_lot else 0.0
-        if not abs(after.mean - before.mean) > by_chance:
-            return Span(low, high)
-        return Span(low, high, steepest=(before.label, after.label))
+        pairs = list(itertools.pairwise(used))
+        steps = [abs(after.mean - before.mean) for before, after in pairs]
+        chance = [
+            before.ci_half_width + after.ci_half_width if self.asked.by_lot else 0.0
+            for before, after in pairs
+        ]
+        k = steps.index(max(steps))
+        others = (s + c for n, (s, c) in enumerate(zip(steps, chance, strict=True)) if n != k)
+        if not steps[k] - chance[k] > max(others):
+            return Span(low, high, apart=apart)
+        before, after = pairs[k]
+        return Span(low, high, steepest=(before.label, after.label), apart=apart)
 
 
 def _shown(mean: float, half_width: float, digits: int, scale: float) -> str:

@@ -7,7 +7,7 @@ import tempfile
 from collections.abc import Container
 from pathlib import Path
 
-from sandmould.bad_input import BadInputError, Problem
+from sandmould.bad_input import BadInputError, Problem, display_path
 from sandmould.definition.run import FILLS
 from sandmould.digest import file_digest
 from sandmould.engines.snapshot_file import SNAPSHOTS, SnapshotFile, stored_snapshots
@@ -88,6 +88,7 @@ def pack(
     of_study = {run.run: left_out[run.run] for run in plan.runs if run.run in left_out}
     number, size = len(plan.runs) - len(of_study), size_text(target.stat().st_size)
     lines = [f"{target}: {number} runs, {size}", *reasons_lines(of_study, "left out")]
+    lines.append(f"Send {display_path(plan.study.path)} and the files that it names with it.")
     if beyond:
         lines.append(f"left out, from outside the study's folder: {listed([*beyond.values()])}")
     return "\n".join(lines)

@@ -56,7 +56,7 @@ class DeckPlanning(Planning[OwnDeck]):
     """See ``Planning``; only the deck knows what time it simulates."""
 
     slower = 3.0
-    guess = "by expected_core_s, an estimate that a pilot run replaces"
+    guess = "by expected_core_s (600 s unless you write it), until a first run has shown it"
     speed = DeckSpeed()
     program = DeckProgram()
     measures = (
@@ -75,6 +75,10 @@ class DeckPlanning(Planning[OwnDeck]):
     def seeded(self, scenario: OwnDeck, seed: int) -> OwnDeck:
         """With the seed and the hash of the deck that is rendered with it."""
         return own_deck.with_deck_hash(super().seeded(scenario, seed))
+
+    def takes_seed(self, scenario: OwnDeck) -> bool:
+        """Whether the template asks for it."""
+        return "seed" in own_deck.names_used(scenario)
 
     def problems(self, scenario: OwnDeck) -> list[Problem]:
         """What keeps the template from being rendered."""

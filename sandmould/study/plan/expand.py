@@ -223,6 +223,10 @@ class _AtPoint:
         """What is wrong with a well-typed scenario of this study, keys from the study's root."""
         planning = self.kind.planning
         misfits = [replace(p, key=f"{ROOT_KEY}.{p.key}") for p in planning.problems(scenario)]
+        replicates = self.study.study.replicates
+        if not misfits and replicates > 1 and not planning.takes_seed(scenario):
+            valid = "1, since the template has no {{ seed }}: all runs of a setting would be equal"
+            return [Problem("replicates", replicates, valid)]
         # What a scene can be measured by is told of one that can be computed.
         if misfits or not self.measured:
             return misfits

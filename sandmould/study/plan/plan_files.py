@@ -209,8 +209,8 @@ def plan_table(runs: Sequence[Run], prices: Prices, cores: int) -> str:
         lines.append(_fills_line(runs, fills))
     whole = duration_text(study_s([prices.piece(run) for run in runs], cores))
     lines.append(
-        f"{len(runs) - len(fills)} runs, {work:.3g} {planning.work_unit}. Wall time on {cores} "
-        f"cores with report: {whole}, {prices.basis(runs)}"
+        f"{len(runs) - len(fills)} runs, {work:.3g} {planning.work_unit}. Wall time on "
+        f"{cores_text(cores)} with report: {whole}, {prices.basis(runs)}"
     )
     settings = [
         alike[0].scenario for alike in points.values() if alike[0].part not in (FILL, COARSER.part)
@@ -255,8 +255,8 @@ def later_lines(later: Sequence[Run], prices: Prices, cores: int) -> str:
             number_of = sum(run.part != FILL for run in sort)
             said += (
                 f"Then{what.format(number_of)}, {work:.3g} "
-                f"{kind_of(sort[0].scenario).planning.work_unit}. Wall time on {cores} cores: "
-                f"{whole}\n"
+                f"{kind_of(sort[0].scenario).planning.work_unit}. Wall time on "
+                f"{cores_text(cores)}: {whole}\n"
             )
     return said
 
@@ -270,6 +270,11 @@ def _fills_line(runs: Sequence[Run], fills: Sequence[Run]) -> str:
         f"The {sharing} runs start from {number} of the box, each computed once. Together the "
         f"fills take about {size_text(state_bytes)} of the disk."
     )
+
+
+def cores_text(cores: int) -> str:
+    """A number of cores."""
+    return f"{cores} core{'s' if cores > 1 else ''}"
 
 
 def _note_line(told: Sequence[tuple[str, Note]], points: int) -> str:

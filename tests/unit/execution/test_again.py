@@ -100,7 +100,7 @@ def test_a_run_that_the_study_no_longer_has_is_refused(plan: Plan) -> None:
     Path("trial.yaml").write_text(study_text([0.01], ["faces"]))
     said = sandmould("again", plan.runs[0].run)
     assert said.exit_code == 1
-    assert "valid is a run that trial.yaml still leads to." in said.stderr
+    assert "valid is a run that trial.yaml still leads to: " in said.stderr
     Path("trial.yaml").unlink()
     (RESULTS / "trial" / OWNER_FILE).unlink()
     said = sandmould("again", plan.runs[0].run)

@@ -26,6 +26,7 @@ from tests.planned import write_plan
 
 TEMPLATE = """\
 variable a equal {{ angle_deg }}
+variable seed equal {{ seed }}
 {% if restart %}read_restart {{ restart }}{% endif %}
 restart 10 {{ restart_files }}
 run {{ number }}
@@ -74,6 +75,13 @@ def test_every_point_gets_its_deck(tmp_path: Path) -> None:
     assert "restart 10 ../restart.a ../restart.b" in text
     assert "read_restart" not in render(runs[0].scenario, "r", "s")
     assert runs[0].run.startswith("angle_deg_10_r1_")
+
+
+def test_replicates_need_a_seed_in_the_template(tmp_path: Path) -> None:
+    path = opened(tmp_path, TEMPLATE.replace("{{ seed }}", "7"))
+    told = r"replicates = 2 cannot be used: valid is 1, since the template has no {{ seed }}"
+    with pytest.raises(BadInputError, match=told):
+        expand(open_study(path))
 
 
 @pytest.mark.parametrize(
@@ -307,6 +315,7 @@ def test_runs_are_collected_and_reported(tmp_path: Path) -> None:
 
 
 ONE_GRAIN = """\
+# seed {{ seed }}
 units si
 {% if restart %}
 read_restart {{ restart }}

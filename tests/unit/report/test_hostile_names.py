@@ -60,7 +60,7 @@ def study_of(folder: Path, names: dict[str, str]) -> Path:
     """Plan, plant and collect a study whose file says such names; its results."""
     folder.mkdir(parents=True)
     template = folder / names["file"]
-    template.write_text("run {{ word }} {{ other }}\n")
+    template.write_text("run {{ word }} {{ other }} {{ seed }}\n")
     study: dict[str, Any] = {
         "kind": "deck",
         "title": names["title"],

@@ -218,7 +218,7 @@ def test_price_of_an_unknown_machine_is_an_estimate(demo: list[Run]) -> None:
     last = price_line(plan_table(demo, Prices(), 1))
     seconds = BEGIN_S + END_S + sum(START_S + SAND.predicted_s(r.scenario) for r in demo)
     assert last.startswith("9 runs")
-    assert last.endswith(f"Wall time on 1 cores with report: {duration_text(seconds)}, an estimate")
+    assert last.endswith(f"Wall time on 1 core with report: {duration_text(seconds)}, an estimate")
 
 
 def test_price_is_grain_steps_over_rate_and_cores(demo: list[Run]) -> None:
@@ -229,7 +229,7 @@ def test_price_is_grain_steps_over_rate_and_cores(demo: list[Run]) -> None:
     grains = sum(plan_counts(demo[0].scenario))
     assert lines[1].split()[:3] == ["frequency_25", "3", f"{grains:,}"]
     assert price_line(table).startswith("9 runs, ")
-    assert price_line(table).endswith(f"Wall time on 1 cores with report: 2.5 h, {MEASURED}")
+    assert price_line(table).endswith(f"Wall time on 1 core with report: 2.5 h, {MEASURED}")
     # Nine runs on two cores: five after each other.
     longer = duration_text(BEGIN_S + END_S + 5 * (START_S + 10_000))
     halved = plan_table(demo, Prices({LAMMPS: total / 90_000}), 2)
