@@ -23,7 +23,6 @@ Model = type[BaseModel]
 Key = tuple[Model, str]
 """A key by the class that declares it: those that inherit it share its study."""
 PHYSICS = {
-    "Scenario.gravity_m_s2": "tests/verification/cases/flight.py",
     "Scenario.measure_at_rest": "tests/verification/cases/shaking.py",
     "Plate.angle_deg": "tests/verification/cases/incline.py",
     "Contact.dashpot": "tests/verification/cases/restitution.py",
