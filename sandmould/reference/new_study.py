@@ -80,7 +80,8 @@ def write_new_study(name: str, path: Path, given: dict[str, Any]) -> Plan:
         text = _study_text(name, path, given, beside)
         plan = open_plan(path, text=text)
         if name == "casting" and (element_m := _finer_element_m(plan.runs[0].scenario)):
-            text = text.replace(*(f"element_m: {m:g} " for m in element_m))
+            coarse, fine = (f"element_m: {each:g} " for each in element_m)
+            text = text.replace(coarse, fine)
             plan = open_plan(path, text=text)
         path.write_text(text, encoding="utf-8")
     except BadInputError:

@@ -39,10 +39,10 @@ from sandmould.runs.formatting import (
     OF_BED,
     display_scale,
     filled_space,
+    is_number,
     number,
     seconds,
     size,
-    titled,
     with_margin,
 )
 from sandmould.runs.outcome import Outcome
@@ -263,10 +263,10 @@ def runs_table(
     has_value = verdict.measure in summary
     columns = (
         Column("run", False),
-        *(Column(titled(k)) for k in keys),
+        *(Column(display_scale(k)[1]) for k in keys),
         *(Column(b) for b in blocks),
         Column("outcome", False),
-        *([Column(titled(verdict.measure))] if has_value else []),
+        *([Column(display_scale(verdict.measure)[1])] if has_value else []),
         *(Column(title) for _, title, _ in cost),
     )
     rows, marked = [], []
@@ -276,10 +276,14 @@ def runs_table(
         rows.append(
             (
                 Cell(str(row[RUN]), str(row[RUN]), f"{runs_href}/{quote(str(row[RUN]))}/"),
-                *(_parameter_cell(row[k]) for k in keys),
+                *(_parameter_cell(row[k], display_scale(k)[0]) for k in keys),
                 *(_parameter_cell(row[b]) for b in blocks),
                 Cell(str(row[OUTCOME]), str(row[OUTCOME]), note=_why(row, why)),
-                *([_value_cell(row[verdict.measure])] if has_value else []),
+                *(
+                    [_value_cell(display_scale(verdict.measure)[0] * _float(row[verdict.measure]))]
+                    if has_value
+                    else []
+                ),
                 *(_cost_cell(row[name], show) for name, _, show in cost),
             )
         )
@@ -293,7 +297,9 @@ def _value_cell(value: Any) -> Cell:
     return Cell(number(_float(value), 4), str(_float(value)))
 
 
-def _parameter_cell(value: Any) -> Cell:
+def _parameter_cell(value: Any, factor: float = 1.0) -> Cell:
+    if factor != 1.0 and is_number(value):
+        value = factor * float(value)
     text = f"{value:.6g}" if isinstance(value, float) else str(value)
     return Cell(text, str(value))
 

@@ -28,6 +28,12 @@ BENDING = (
 OUTSIDE = "pattern_outside_tolerance_fraction"
 
 
+MOST_QUARTERS = 16
+"""Quarters of the vibration after which shaking for longer is no advice: four times as long."""
+NEARLY_EMPTY = 0.05
+"""Share of what fits below which a few grains are all that a space holds."""
+
+
 class Decided(StrEnum):
     """What the runs of a study say of its question."""
 
@@ -199,5 +205,22 @@ class Answer:
 
     @property
     def longer_helps(self) -> bool:
-        """Whether the best setting was still getting better as its vibration ended."""
-        return self.still_changes * (1.0 if self.asked.better == "larger" else -1.0) > 0.0
+        """Whether the best setting was still getting better as its vibration ended.
+
+        Where a target is missed, fast enough to reach it within ``MOST_QUARTERS`` at that pace.
+        """
+        sign = 1.0 if self.asked.better == "larger" else -1.0
+        if self.still_changes * sign <= 0.0:
+            return False
+        share = self.shares.get(self.best.label) if self.best else None
+        if self.decided is not Decided.NONE_REACHES or share is None or self.asked.goal is None:
+            return True
+        gained = share.mean * abs(self.still_changes) / (1.0 + abs(self.still_changes))
+        return abs(self.asked.goal.value - share.mean) <= MOST_QUARTERS * gained
+
+    @property
+    def nearly_empty(self) -> bool:
+        """Whether a space that is to be filled holds next to nothing at the best setting."""
+        best = self.shares.get(self.best.label) if self.best else None
+        misses = self.decided is Decided.NONE_REACHES and self.asked.better == "larger"
+        return misses and best is not None and best.mean < NEARLY_EMPTY

@@ -36,6 +36,8 @@ MOST_NAMED = 100
 NOTHING = 1e-3
 """Share of the largest value below which one is told as none."""
 _MOST_LABELS = 8
+WIDEST = 0.5
+"""Of the scale of a share: a wider margin says nothing, and is not told."""
 OF_DRIVE = ("frequency_hz", "acceleration_g", "velocity_m_s", "displacement_m")
 """Ends of swept keys that the motion of the box states."""
 REASONS = {
@@ -196,6 +198,13 @@ class AnswerWords:
     def seconds(time_s: float) -> str:
         """A duration."""
         return f"{time_s:.2g} s" if time_s < 60.0 else seconds(time_s)
+
+    @property
+    def has_margin(self) -> bool:
+        """Whether the best setting's share has a margin that says something."""
+        best = self.answer.best
+        share = self.answer.shares.get(best.label) if best else None
+        return share is None or not share.ci_half_width > WIDEST
 
     @property
     def target(self) -> str:
@@ -363,6 +372,6 @@ class AnswerWords:
 
 def _shown(mean: float, half_width: float, digits: int, scale: float) -> str:
     """A value with its margin, unless that is wider than what the value can be."""
-    if not math.isfinite(half_width) or half_width > scale:
+    if not math.isfinite(half_width) or half_width > WIDEST * scale:
         return number(mean, digits) if digits else f"{mean:.0f}"
     return with_margin(mean, half_width)

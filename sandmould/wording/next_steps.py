@@ -7,6 +7,7 @@ from dataclasses import dataclass
 
 from sandmould.definition.certificate import frequency_key
 from sandmould.definition.study import Study
+from sandmould.kinds.sand.narrow import Narrow
 from sandmould.runs.formatting import filled_space, listed, name_of, value_text
 from sandmould.runs.templates import worded
 from sandmould.statistics.answer import Answer, Decided
@@ -20,6 +21,7 @@ WORTH = 30
 FINE_ENOUGH = 0.02
 """Share of a value that sizes of elements or steps may leave open."""
 OWN_FILE = "my_study.yaml"
+SIZE_SCALE = "sand.size_scale"
 
 
 @dataclass(frozen=True)
@@ -95,7 +97,9 @@ def answer_steps(study: Study, answer: Answer) -> list[NextStep]:
         side = "above" if end.is_highest else "below"
         value = value_text(end.key, end.value)
         steps.append(step("beyond", a_key=_a(name_of(end.key)), side=side, value=value))
-    if decided is Decided.NONE_REACHES and not steps and study.objective.is_fill:
+    if study.objective.is_fill and (
+        answer.nearly_empty or (decided is Decided.NONE_REACHES and not steps)
+    ):
         space = filled_space(answer.asked.measure).replace("_", " ")
         steps.append(step("turn", space=space))
     return steps
@@ -181,6 +185,18 @@ def certificate_steps(study: Study, answer: Answer) -> list[NextStep]:
     if study.sweep.number_of_points < fewest:
         return [step("frequencies", fewest=fewest)]
     return [step("certificate", "certificate: {controls: [springs, hold, time_step]}")]
+
+
+def narrow_steps(study: Study, spaces: Sequence[Narrow]) -> list[NextStep]:
+    """Finer grains, where what is judged is too narrow for those of the model."""
+    if SIZE_SCALE in study.sweep.swept:
+        return []
+    judged = filled_space(study.objective.measure).replace("_", " ")
+    return [
+        step("narrow", f"scenario: {{sand: {{size_scale: {it.scale:g}}}}}", space=judged, it=it)
+        for it in spaces
+        if judged in it.names and it.scale >= 1.0
+    ]
 
 
 def sand_steps(study: Study, is_sound: bool) -> list[NextStep]:

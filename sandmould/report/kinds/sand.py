@@ -8,6 +8,7 @@ import pandas as pd
 
 from sandmould.drawing.chart import Chart
 from sandmould.drawing.figure_files import pictures, strip
+from sandmould.kinds.sand.narrow import narrow_spaces
 from sandmould.report.bed_mode import bed_mode
 from sandmould.report.drive import drive_of
 from sandmould.report.filling import FillingPages, filling_pages
@@ -28,6 +29,7 @@ from sandmould.statistics.verdict import Verdict
 from sandmould.study.collect import Collected
 from sandmould.wording.answer import sand_limits
 from sandmould.wording.grounds import sand_grounds
+from sandmould.wording.next_steps import narrow_steps
 
 
 def _notes(
@@ -81,6 +83,7 @@ def _pages(findings: Findings[Scenario], film_budget_bytes: int) -> KindPages:
         grounds=sand_grounds(
             scenario, study, verdict, findings.scenarios, grain_size.short if grain_size else ()
         ),
+        steps=tuple(narrow_steps(study, narrow_spaces(scenario))),
         warning=_softness(scenario, of_sweep.summary),
     )
 
