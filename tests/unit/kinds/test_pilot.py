@@ -89,7 +89,9 @@ def test_plan_starts_no_deck(
     else:
         plan = short(tmp_path, 2000)
     said = announce(plan, tmp_path, 1, measure="engines")
-    assert ", by expected_core_s (600 s unless you write it), until a first run has shown it\n" in said
+    assert (
+        ", by expected_core_s (600 s unless you write it), until a first run has shown it\n" in said
+    )
     assert not (user_cache() / "speeds").exists()
 
 

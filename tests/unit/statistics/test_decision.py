@@ -8,11 +8,14 @@ from dataclasses import replace
 import pandas as pd
 import pytest
 
+from sandmould.kinds.sand.kind import SandStudy
+from sandmould.kinds.sand.narrow import Narrow
 from sandmould.statistics.answer import Asked, Decided
 from sandmould.statistics.config import Aim, Goal
 from sandmould.statistics.decision import Evidence, decide
 from sandmould.statistics.over_time import first_reach_s
 from sandmould.statistics.refining import Refining, refining_of, resolution_among
+from sandmould.wording.next_steps import answer_steps, narrow_steps
 from tests import answered
 from tests.answered import BENT, FILL, FREEZES, HOLE, HZ, POCKET, TIP, G, table
 
@@ -29,7 +32,42 @@ def test_no_setting_reaches_the_target() -> None:
     assert (found.best.label, found.reach) == ("60 Hz", ())
     assert found.shares["60 Hz"].mean == pytest.approx(0.0595)
     assert found.still_changes == pytest.approx(0.14, abs=0.001)
-    assert found.longer_helps
+
+
+@pytest.mark.parametrize(
+    ("share", "rises", "longer_helps", "nearly_empty"),
+    [
+        # at 0.02 a quarter 0.75 comes to 0.95 in ten more quarters, 0.35 in thirty
+        (0.75, 0.02 / 0.73, True, False),
+        (0.35, 0.02 / 0.33, False, False),
+        (0.04, 0.6, False, True),
+    ],
+)
+def test_longer_is_advised_where_it_can_help(
+    share: float, rises: float, longer_helps: bool, nearly_empty: bool
+) -> None:
+    summary = table(HZ, **{POCKET: {30: (0.0, 0.01), 60: (share, share)}})
+    curves = answered.over_a_second(summary, rises, POCKET)
+    found = answered.answered(summary, POCKET, [HZ], curves=curves)
+    assert (found.longer_helps, found.nearly_empty) == (longer_helps, nearly_empty)
+    study = SandStudy.model_validate({"objective": {"measure": POCKET}})
+    assert (
+        any("Turn the pocket" in each.text for each in answer_steps(study, found)) == nearly_empty
+    )
+
+
+def test_finer_grains_are_advised_where_what_is_judged_is_narrow() -> None:
+    narrow = [Narrow(["hole", "slot"], 0.018, 0.008, 3.7)]
+    for measure, swept, told in (
+        (HOLE.replace("hole18", "hole"), HZ, True),
+        (POCKET, HZ, False),
+        (HOLE.replace("hole18", "hole"), "sand.size_scale", False),
+    ):
+        study = SandStudy.model_validate(
+            {"objective": {"measure": measure}, "sweep": {"keys": {swept: [5, 6]}}}
+        )
+        steps = narrow_steps(study, narrow)
+        assert [each.line for each in steps] == ["scenario: {sand: {size_scale: 3.7}}"] * told
 
 
 def test_several_reach_it_and_one_is_gentlest_another_shortest() -> None:
