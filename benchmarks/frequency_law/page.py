@@ -20,6 +20,7 @@ from sandmould import ROOT
 from sandmould.execution.records import RECORDS
 from sandmould.runs.formatting import number
 from sandmould.scenario.scenario import Scenario
+from sandmould.statistics.agreement import sweep_part
 from sandmould.study.collect import read_summary, swept_keys
 from sandmould.study.plan.expand import expand
 from sandmould.study.plan.load_study import open_study
@@ -151,7 +152,7 @@ def _law_of(records: Path) -> dict[str, Any] | None:
 def _study(folder: Path) -> dict[str, Any]:
     record = json.loads((folder / "record.json").read_text(encoding="utf-8"))
     opened = open_study(ROOT / record["study"])
-    summary = read_summary(folder)
+    summary = sweep_part(read_summary(folder))
     keys = swept_keys(summary)
     other = next((key for key in keys if key != FREQUENCY), None)
     scenarios: dict[Any, Scenario] = {}
