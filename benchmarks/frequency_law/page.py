@@ -201,5 +201,6 @@ def _law(there: Mapping[str, dict[str, Any]], others: Sequence[RecordedCurves]) 
             (HELD_OUT[study.name], curve, groups.held_out(settings, groups.settings_of([curve])))
             for study in others
             for curve in study.curves
+            if not curve.label
         ],
     }
