@@ -106,7 +106,7 @@ def test_lines_of_steps_belong_in_the_users_file() -> None:
     shipped = with_file([line], "shipped study tube_demo", "tube_demo", "tube_demo")
     assert "my_study.yaml below based_on: tube_demo" in shipped.before
     assert shipped.command == "sandmould run my_study.yaml"
-    assert with_file([step("try")], None, "", "tube").before == ""
+    assert with_file([step("try", is_sand=True)], None, "", "tube").before == ""
 
 
 def test_what_to_do_next_says_how_many_runs() -> None:
