@@ -26,12 +26,10 @@ BENDING = (
 )
 """Measures of how far a pattern is bent."""
 OUTSIDE = "pattern_outside_tolerance_fraction"
-
-
 MOST_QUARTERS = 16
-"""Quarters of the vibration after which shaking for longer is no advice: four times as long."""
+"""Quarters of the vibration, four times as long, after which longer is no advice (argued)."""
 NEARLY_EMPTY = 0.05
-"""Share of what fits below which a few grains are all that a space holds."""
+"""Share of what fits below which a few grains are all that a space holds (argued)."""
 
 
 class Decided(StrEnum):

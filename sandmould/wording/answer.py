@@ -37,7 +37,7 @@ NOTHING = 1e-3
 """Share of the largest value below which one is told as none."""
 _MOST_LABELS = 8
 WIDEST = 0.5
-"""Of the scale of a share: a wider margin says nothing, and is not told."""
+"""Of the scale of a share: a wider margin says nothing, and is not told (argued)."""
 OF_DRIVE = ("frequency_hz", "acceleration_g", "velocity_m_s", "displacement_m")
 """Ends of swept keys that the motion of the box states."""
 REASONS = {

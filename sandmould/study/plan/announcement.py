@@ -97,7 +97,8 @@ def left_line(plan: Plan, results: Path, cores: int) -> str:
     ended = len(plan.runs) - sum(run.part != FILL for run in left)
     if not left:
         return f"All {ended} runs have ended here.\n"
-    pieces = [known_prices(plan, results).piece(run) for run in left]
+    prices = known_prices(plan, results)
+    pieces = [prices.piece(run) for run in left]
     takes = f"the others take about {duration_text(study_s(pieces, cores))}"
     return f"{ended} of {len(plan.runs)} runs have ended here; {takes}.\n" if ended else ""
 
