@@ -86,7 +86,7 @@ def _computed_hash(run: Run) -> str:
 
 def runs_in(study: OpenStudy, folder: Path) -> list[Run]:
     """All runs of a study, with those of the rounds that a folder keeps."""
-    return planned_runs(study, read_rounds(folder, study.study))
+    return planned_runs(study, read_rounds(folder, study.study), folder)
 
 
 def record(path: Path, results: Path, figures: Sequence[str] = ()) -> Path:

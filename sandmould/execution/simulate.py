@@ -55,7 +55,8 @@ def measure(run: Run, folder: Path) -> None:
         for path in folder.rglob("*")
         if path.is_file() and earlier.get(path) != path.stat().st_mtime_ns
     }
-    write_manifest(folder, "measured", written, code=kind_of(run.scenario).planning.measuring_hash)
+    code = kind_of(run.scenario).planning.measured_by(run.scenario)
+    write_manifest(folder, "measured", written, code=code)
 
 
 def provenance(scenario: Any, *arguments: str) -> dict[str, Any]:

@@ -92,6 +92,14 @@ class Planning(ABC, Generic[ScenarioT]):
         """State of the code that takes the measures: runs measured by another one are so again."""
         return code_identity([[ROOT / file for file in self.measuring]])
 
+    def measured_by(self, scenario: ScenarioT) -> str:
+        """State of all that says how a run is measured."""
+        return self.measuring_hash
+
+    def unmeasurable(self, scenario: ScenarioT, folder: Path) -> list[Problem]:
+        """Measures that are asked of a run and that what it left cannot give."""
+        return []
+
     def resolved(self, scenario: ScenarioT) -> ScenarioT:
         """The scenario with the hashes of the files that it names."""
         return scenario

@@ -31,7 +31,7 @@ def scenario_hash(scenario: Section) -> str:
     key = type(scenario), scenario.model_dump_json(exclude=seed)
     values = _SEEDLESS.get(key)  # replicates of a point follow each other
     if values is None:
-        values = {name: value for name, value in said(scenario).items() if name != "seed"}
+        values = _seedless(scenario)
         _SEEDLESS.clear()
         _SEEDLESS[key] = values
     own = {name: getattr(scenario, name) for name in seed}
@@ -88,5 +88,10 @@ def _defaults(section: type[Section]) -> dict[str, Any]:
 
 def solution_hash(scenario: Section, solver: str) -> str:
     """Hash of a scenario without its seed, and of the solver that computes it."""
-    values = {key: value for key, value in said(scenario).items() if key != "seed"}
-    return digest(json.dumps(values, sort_keys=True), solver)
+    return digest(json.dumps(_seedless(scenario), sort_keys=True), solver)
+
+
+def _seedless(scenario: Section) -> dict[str, Any]:
+    """What a scenario says of what is computed, but for its seed."""
+    left_out = {"seed", *scenario.uncomputed}
+    return {key: value for key, value in said(scenario).items() if key not in left_out}

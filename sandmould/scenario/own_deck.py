@@ -72,6 +72,8 @@ class Taken(Section):
 class OwnDeck(Section):
     """One run of a template of the user's, complete."""
 
+    # the hash of the rendered deck says what the values do
+    uncomputed = frozenset({"values", "measures", "expected_core_s", "memory_mb"})
     engine: DeckEngine = Field(
         DeckEngine(), description="Engine that runs the deck, and its cores."
     )

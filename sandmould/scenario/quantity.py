@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
-from typing import Any, get_args
+from typing import Any, ClassVar, get_args
 
 from pydantic import BaseModel, ConfigDict, Field
 from pydantic.fields import FieldInfo
@@ -28,6 +28,8 @@ class Section(BaseModel):
         allow_inf_nan=False,
         validate_default=True,
     )
+    uncomputed: ClassVar[frozenset[str]] = frozenset()
+    """Keys that change nothing that is computed, so that they do not tell one run from another."""
 
 
 def quantity(

@@ -32,7 +32,7 @@ class DeckExecution(Execution[OwnDeck]):
 
     def complete(self, scenario: OwnDeck, work: Path) -> None:
         """Make the table of what the log of a broken run holds."""
-        computation.series(scenario, work).to_csv(work / "series.tsv", sep="\t", index=False)
+        computation.series(work).to_csv(work / "series.tsv", sep="\t", index=False)
 
     def no_cost(self, scenario: OwnDeck) -> Cost:
         """Cost before the engine has started."""

@@ -66,7 +66,18 @@ class DeckPlanning(Planning[OwnDeck]):
             (Measure("<measure>", "What scenario.measures takes of the log or of a dump."),),
         ),
     )
-    measuring = ("sandmould/kinds/deck/measure.py",)
+    measuring = ("sandmould/kinds/deck/measure.py", "sandmould/kinds/deck/own/measures.py")
+
+    def measured_by(self, scenario: OwnDeck) -> str:
+        """With the measures that are asked for: all of the log and its dumps are kept."""
+        asked = scenario.model_dump_json(include={"measures"})
+        return digest(super().measured_by(scenario), asked)[:SHORT]
+
+    def unmeasurable(self, scenario: OwnDeck, folder: Path) -> list[Problem]:
+        """Measures whose columns stand neither in the log of a run nor in its dumps."""
+        from sandmould.kinds.deck import measure
+
+        return measure.unmeasurable(scenario, folder)
 
     def resolved(self, scenario: OwnDeck) -> OwnDeck:
         """With the hashes of its files; that of its deck comes with the seed."""

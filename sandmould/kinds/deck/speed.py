@@ -25,7 +25,8 @@ from sandmould.engines.registry import engine_module
 from sandmould.kinds.deck.own import computation
 from sandmould.kinds.deck.own import deck as own_deck
 from sandmould.kinds.deck.own.columns import missing_columns
-from sandmould.kinds.deck.own.thermo import STEP
+from sandmould.kinds.deck.own.measures import measured
+from sandmould.kinds.deck.own.thermo import LOGGED, STEP
 from sandmould.kinds.stored_speed import StoredSpeed
 from sandmould.runs.files import write_text
 from sandmould.runs.formatting import display_number, name_of
@@ -115,7 +116,7 @@ def pilot(scenario: OwnDeck, results: Path, pilot_s: float = PILOT_S) -> tuple[f
         core_s, status = _computed(scenario, folder, pilot_s)
         if status is not None and not (folder / "whole.json").exists():
             raise BadInputError([_failure(scenario, folder, status, results)])
-        whole = computation.series(scenario, folder / "work")
+        whole = _measured(scenario, folder / "work")
         shown = (_lacks(scenario, whole), _resumed(scenario, whole, folder, pilot_s))
         return core_s, "\n".join(f"{_of_values(scenario)}: {said}." for said in shown if said)
 
@@ -133,7 +134,7 @@ def _computed(scenario: OwnDeck, folder: Path, pilot_s: float) -> tuple[float | 
 
 def _lacks(scenario: OwnDeck, series: pd.DataFrame) -> str:
     """Say which columns the log of a pilot has not printed yet."""
-    logged = [str(name).removeprefix(computation.LOGGED) for name in series]
+    logged = [str(name).removeprefix(LOGGED) for name in series]
     missing = missing_columns(scenario, logged) if len(series) else ""
     return f"in its first seconds {missing.rstrip('.')}" if missing else ""
 
@@ -151,12 +152,18 @@ def _resumed(scenario: OwnDeck, whole: pd.DataFrame, folder: Path, pilot_s: floa
     said = why.read_text(encoding="utf-8") if why.exists() else computation.WENT_ON
     if not said.startswith(computation.WENT_ON):
         return f"a run that is killed does not go on as it should. {said}"
-    return difference(whole, computation.series(scenario, work), list(scenario.measures))
+    return difference(whole, _measured(scenario, work), list(scenario.measures))
+
+
+def _measured(scenario: OwnDeck, work: Path) -> pd.DataFrame:
+    """The log of a pilot with the measures beside it."""
+    series = computation.series(work)
+    return pd.concat([measured(scenario, series, work / own_deck.OUTPUT), series], axis=1)
 
 
 def difference(whole: pd.DataFrame, resumed: pd.DataFrame, measures: Sequence[str]) -> str:
     """Say which measures a restart changes, at the last step of both series, or nothing."""
-    step = computation.LOGGED + STEP
+    step = LOGGED + STEP
     names = [name for name in measures if name in whole]
     one, other = (
         table.drop_duplicates(step, keep="last").set_index(step)[names]

@@ -18,12 +18,14 @@ from sandmould.definition.comparing import ENGINE
 from sandmould.definition.run import Run
 from sandmould.definition.sweep import Point, points
 from sandmould.kinds.kind import AnyScenario, Kind, Planning, SpeedClass
-from sandmould.kinds.registry import kind_named
+from sandmould.kinds.registry import kind_named, kind_of
+from sandmould.runs.manifest import OUTCOME_FILE
 from sandmould.study.plan.batches import Batch, plan_batches
 from sandmould.study.plan.expand import expand, swept_key
 from sandmould.study.plan.fills import planned_work, share_fills
 from sandmould.study.plan.grain_check import affordable_runs
-from sandmould.study.plan.lacking import Lack, Need, lacks
+from sandmould.study.plan.kept_names import under_kept_names
+from sandmould.study.plan.lacking import Lack, Need, lack_of, lacks
 from sandmould.study.plan.later_key import at_later_key
 from sandmould.study.plan.load_study import OpenStudy, StudyFile, study_files, study_of
 from sandmould.study.plan.measured import problems_elsewhere
@@ -202,10 +204,15 @@ def open_plan(path: Path, results: Path = RESULTS, text: str | None = None) -> P
     return Plan(study, tuple(shared), tuple(fills), tuple(_later(runs, trial, fills, planning)))
 
 
-def planned_runs(study: OpenStudy, log: RoundLog) -> list[Run]:
-    """Runs of a study with those of its rounds and of what they have decided."""
+def planned_runs(study: OpenStudy, log: RoundLog, folder: Path) -> list[Run]:
+    """Runs of a study with those of its rounds and of what they have decided.
+
+    ``folder``: of its results, where runs may lie under names that they had before.
+    """
     runs = expand(study, log.runs, log.certified_hz)
-    return [*runs, *affordable_runs(study, log.coarsened or (), runs)] if log.coarsened else runs
+    if log.coarsened:
+        runs += affordable_runs(study, log.coarsened, runs)
+    return under_kept_names(runs, folder)
 
 
 def _misfits(files: Sequence[StudyFile]) -> set[str]:
@@ -219,8 +226,9 @@ def _misfits(files: Sequence[StudyFile]) -> set[str]:
 
 def _sound_runs(study: OpenStudy, results: Path) -> tuple[list[Run], list[Run]]:
     """Runs of a study and of a trial of its controls, all of which their engines can compute."""
-    log = read_rounds(results / study.name, study.study)
-    runs = planned_runs(study, log)
+    folder = results / study.name
+    log = read_rounds(folder, study.study)
+    runs = planned_runs(study, log, folder)
     problems: dict[str, Problem] = {}
     # Controls come hours later, at frequencies that are not known yet: they are tried at others.
     certificate = study.study.certificate
@@ -236,12 +244,21 @@ def _sound_runs(study: OpenStudy, results: Path) -> tuple[list[Run], list[Run]]:
         if problem is not None:
             problem = _at_stated_key(study, run, problem)
             problems[str(problem)] = problem
-    for problem in problems_elsewhere(study.study, results):
+    unmeasurable = (replace(p, key=f"scenario.{p.key}") for p in _unmeasurable(runs, folder))
+    for problem in (*problems_elsewhere(study.study, results), *unmeasurable):
         found = replace(problem, file=study.origin.file_of(problem.key))
         problems[str(found)] = found
     if problems:
         raise BadInputError(list(problems.values()))
     return runs, trial
+
+
+def _unmeasurable(runs: Sequence[Run], folder: Path) -> list[Problem]:
+    """Measures asked for that the first run which has ended cannot give: the others are alike."""
+    ended = next((run for run in runs if (folder / run.place / OUTCOME_FILE).exists()), None)
+    if ended is None or lack_of(ended, folder / ended.place).need is not Need.MEASURE:
+        return []
+    return kind_of(ended.scenario).planning.unmeasurable(ended.scenario, folder / ended.place)
 
 
 def checked_plan(path: Path, text: str | None = None) -> Plan:

@@ -60,7 +60,7 @@ def lack_of(run: Run, folder: Path, template_hash: Callable[[Run], str] | None =
     """
     wanted = template_hash or _template_hash
     try:
-        RunOutcome.read(folder / "outcome.json")
+        outcome = RunOutcome.read(folder / "outcome.json").outcome
     except FileNotFoundError:
         known = (folder / MANIFEST_FILE).exists()
         return Lack(Need.COMPUTE, "outcome.json is missing" if known else "")
@@ -78,6 +78,8 @@ def lack_of(run: Run, folder: Path, template_hash: Callable[[Run], str] | None =
     except UNREADABLE:
         return Lack(Need.COMPUTE, f"{MANIFEST_FILE} cannot be read")
     lack = _lack_of_files(run, folder, manifest)
+    if lack.need is Need.MEASURE and outcome is Outcome.BAD_INPUT:
+        return Lack(Need.COMPUTE, lack.why)  # it may have been the measures that it ended for
     return lack if run.part != FILL or lack.need is Need.COMPUTE else _lack_of_end(run, folder)
 
 
@@ -108,11 +110,11 @@ def _lack_of_files(run: Run, folder: Path, manifest: Manifest) -> Lack:
 
 
 def _measured_otherwise(run: Run, manifest: Manifest) -> str:
-    """Say that other code than today's measured a run that can be measured again."""
+    """Say that a run that can be measured again was measured otherwise than it would be today."""
     code = manifest.get(MEASURED_BY, {}).get("code_sha256")
-    if LEFT_OUT in manifest or code == kind_of(run.scenario).planning.measuring_hash:
+    if LEFT_OUT in manifest or code == kind_of(run.scenario).planning.measured_by(run.scenario):
         return ""
-    return "our code measures otherwise since"
+    return "it is measured otherwise since"
 
 
 def _template_hash(run: Run) -> str:

@@ -290,7 +290,7 @@ def test_runs_are_collected_and_reported(tmp_path: Path) -> None:
         angle_deg = run.parameters["values.angle_deg"]
         speed = angle_deg / 10 + 0.0001 * angle_deg * run.replicate
         of_run = folder / "runs" / run.run
-        pd.DataFrame({"time_s": [0.0, 1.0], "speed_m_s": [0.0, speed]}).to_csv(
+        pd.DataFrame({"time_s": [0.0, 1.0], "log_v_speed": [0.0, speed]}).to_csv(
             of_run / "series.tsv", sep="\t", index=False
         )
         (of_run / "outcome.json").write_text(

@@ -158,7 +158,7 @@ class Jobs:
     def measure(self, run: Run, folder: Path) -> None:
         self.measured.append(folder.name)
         (folder / LAST_MEASURED).touch()
-        code = kind_of(run.scenario).planning.measuring_hash
+        code = kind_of(run.scenario).planning.measured_by(run.scenario)
         write_manifest(folder, "measured", {LAST_MEASURED: 0}, code=code)
 
 

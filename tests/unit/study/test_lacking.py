@@ -139,7 +139,7 @@ def test_what_other_code_measured_is_measured_again_if_it_can_be(plan: Plan) -> 
         {step: tree[step] for step in tree if step != "measured_by"},
     ):
         path.write_text(json.dumps(of_other_code))
-        assert lack(plan) == Lack(Need.MEASURE, "our code measures otherwise since")
+        assert lack(plan) == Lack(Need.MEASURE, "it is measured otherwise since")
         # a pack that leaves out what is measured keeps the measures that it has
         path.write_text(json.dumps(of_other_code | {LEFT_OUT: {"snapshots.npz": 1}}))
         assert lack(plan) == WHOLE

@@ -166,7 +166,7 @@ def finish(plan: Plan) -> None:
         }
         outcome = RunOutcome(Outcome.FINISHED, "", 1.0, 1.0)
         write_manifest(folder, "computed", {}, origin, {"wall_s": 1.0}, outcome=outcome.text)
-        write_manifest(folder, "measured", {}, code=planning.measuring_hash)
+        write_manifest(folder, "measured", {}, code=planning.measured_by(run.scenario))
         outcome.write(folder / "outcome.json")
 
 
@@ -263,6 +263,48 @@ def test_an_edit_touches_just_its_runs(
     finally:
         path.write_bytes(before)
     assert needs == touched * [Need.COMPUTE]
+
+
+def test_runs_are_the_same_where_the_study_sweeps_one_more_key(
+    finished: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    shutil.copytree(finished, tmp_path / "edited")
+    monkeypatch.chdir(tmp_path / "edited")
+    before = {run.run for run in open_plan(Path("plain.yaml")).runs}
+    one_more = "contact.grain_grain.friction: [0.6, 0.8]"
+    friction = "sweep: {keys: {contact.grain_grain.normal_stiffness_n_m: [60000, 70000], "
+    text = STUDIES["plain"].split("sweep:")[0] + friction + one_more + "}}\nreplicates: 2\n"
+    Path("plain.yaml").write_text(text, encoding="utf-8")
+    plan = open_plan(Path("plain.yaml"))
+    assert len(plan.runs) == 8
+    assert {run.run for run in plan.runs} > before
+    assert not before & plan.lacks(RESULTS).keys()
+    assert orphans(plan, RESULTS) == []
+    # of another scenario, though its name ends alike
+    shutil.rmtree(RESULTS / "plain" / "runs")
+    stray = RESULTS / "plain" / "runs" / f"other_r1_{plan.runs[0].run[-6:]}"
+    stray.mkdir(parents=True)
+    shutil.copy(next(RESULTS.glob("layers/runs/*/products.json")), stray)
+    assert stray.name not in {run.run for run in open_plan(Path("plain.yaml")).runs}
+
+
+def test_a_deck_is_only_measured_again_where_another_measure_is_asked(
+    finished: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    shutil.copytree(finished, tmp_path / "edited")
+    monkeypatch.chdir(tmp_path / "edited")
+    more = STUDIES["deck"].replace("KinEng}", "KinEng, potential_j: PotEng}")
+    Path("deck.yaml").write_text(more, encoding="utf-8")
+    with pytest.raises(BadInputError, match=r"potential_j.*log of the runs that have ended"):
+        open_plan(Path("deck.yaml"))
+    for series in RESULTS.glob("deck/runs/*/series.tsv"):
+        series.write_text("time_s\tlog_Step\tlog_KinEng\tlog_PotEng\n", encoding="utf-8")
+    plan = open_plan(Path("deck.yaml"))
+    assert [lack.need for lack in plan.lacks(RESULTS).values()] == 4 * [Need.MEASURE]
+    # one that ended for a measure which its log lacked
+    (folder,) = RESULTS.glob(f"deck/runs/{plan.runs[0].run}")
+    RunOutcome(Outcome.BAD_INPUT, "the log lacks it", 1.0, 1.0).write(folder / "outcome.json")
+    assert plan.lacks(RESULTS)[plan.runs[0].run].need is Need.COMPUTE
 
 
 KEY = "    measure_at_rest: bool = quantity("

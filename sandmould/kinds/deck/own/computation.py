@@ -15,15 +15,13 @@ from sandmould.engines.registry import deck_reader, engine_module
 from sandmould.engines.session import EngineStop
 from sandmould.kinds.deck.own.columns import missing_columns
 from sandmould.kinds.deck.own.deck import OUTPUT, RESTART_FILES, check_unchanged, names_used, render
-from sandmould.kinds.deck.own.measures import measured, missing_dump
-from sandmould.kinds.deck.own.thermo import STEP, Thermo, read_thermo
+from sandmould.kinds.deck.own.measures import missing_dumps
+from sandmould.kinds.deck.own.thermo import LOGGED, STEP, Thermo, read_thermo
 from sandmould.runs.outcome import Outcome, RunOutcome
 from sandmould.runs.products import Computed, Cost, cpu_time_s, peak_memory_bytes
 from sandmould.runs.progress import LINE_EVERY_S, Progress
 from sandmould.scenario.own_deck import CLOCK, OwnDeck
 
-LOGGED = "log_"
-"""Begins the names of the log's own columns in ``series.tsv``."""
 FLUSH_EVERY_S = 0.5
 """What a killed run can lose of its log."""
 _DECK = "deck.in"
@@ -87,7 +85,7 @@ def compute(scenario: OwnDeck, folder: Path, run: str, study: str) -> Computed:
     thermo = read_thermo(_logs(work))
     if outcome is Outcome.FINISHED:
         missing = missing_columns(scenario, [str(column) for column in thermo.table])
-        missing = missing or missing_dump(scenario, output)
+        missing = missing or _missing_dumps(scenario, output)
         if said := missing or _wrong_end(scenario, thermo, bool(restart)):
             outcome, detail = Outcome.BAD_INPUT, said
     cost.version = str(engine.installed_version())
@@ -101,6 +99,15 @@ def compute(scenario: OwnDeck, folder: Path, run: str, study: str) -> Computed:
     last_s = float(thermo.table[CLOCK].iloc[-1]) if CLOCK in thermo.table else 0.0
     detail = "; ".join([detail, *notes] if detail else notes)
     return Computed(RunOutcome(outcome, detail, last_s, last_s), cost, is_root)
+
+
+def _missing_dumps(scenario: OwnDeck, output: Path) -> str:
+    """Say which measures cannot be read from a dump; nothing where all can."""
+    lacks = [
+        f"{taken.dump} with {taken.of} (measures.{name})"
+        for name, taken in missing_dumps(scenario, output)
+    ]
+    return f"the deck wrote no {', '.join(lacks)}" if lacks else ""
 
 
 def _wrong_end(scenario: OwnDeck, thermo: Thermo, went_on: bool) -> str:
@@ -120,12 +127,11 @@ def _wrong_end(scenario: OwnDeck, thermo: Thermo, went_on: bool) -> str:
     return f"{said}: state the steps that the deck runs, or none"
 
 
-def series(scenario: OwnDeck, work: Path) -> pd.DataFrame:
-    """Time in s, the measures by name, and the whole log beside them."""
+def series(work: Path) -> pd.DataFrame:
+    """Time in s, and the whole log beside it."""
     table = read_thermo(_logs(work)).table
     clock = table[[CLOCK]].set_axis(["time_s"], axis=1) if CLOCK in table else table[[]]
-    each = measured(scenario, table, work / OUTPUT)
-    return pd.concat([clock, each, table.add_prefix(LOGGED)], axis=1)
+    return pd.concat([clock, table.add_prefix(LOGGED)], axis=1)
 
 
 def restarts(scenario: OwnDeck, work: Path) -> list[Path]:

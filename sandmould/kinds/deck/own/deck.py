@@ -33,17 +33,12 @@ def with_file_hashes(scenario: OwnDeck) -> OwnDeck:
 def with_deck_hash(scenario: OwnDeck) -> OwnDeck:
     """The same run with the hash of what its template renders, if it can be rendered.
 
-    Two texts count: that of the beginning, and that of going on from a restart file. A template
-    that comes with us counts by its own text.
+    Two texts count: that of the beginning, and that of going on from a restart file.
     """
-    path = scenario.paths[scenario.template]
     with contextlib.suppress(OSError, ValueError):
-        if path.is_relative_to(DECKS):
-            sha256 = file_digest(path)
-        else:
-            starts = ("", RESTART_FILES[0]) if "restart" in names_used(scenario) else ("",)
-            decks = (render(scenario, "run", "study", start) for start in starts)
-            sha256 = digest("\n".join(map(_commands, decks)))
+        starts = ("", RESTART_FILES[0]) if "restart" in names_used(scenario) else ("",)
+        decks = (render(scenario, "run", "study", start) for start in starts)
+        sha256 = digest("\n".join(map(_commands, decks)))
         hashes = {**scenario.sha256, scenario.template: sha256}
         return scenario.model_copy(update={"sha256": hashes})
     return scenario

@@ -10,27 +10,33 @@ import numpy as np
 import pandas as pd
 from numpy.typing import NDArray
 
-from sandmould.kinds.deck.own.thermo import STEP
-from sandmould.scenario.own_deck import CLOCK, OwnDeck, Taken
+from sandmould.kinds.deck.own.thermo import LOGGED, STEP
+from sandmould.scenario.own_deck import OwnDeck, Taken
 
 
-def measured(scenario: OwnDeck, table: pd.DataFrame, output: Path) -> pd.DataFrame:
+def measured(scenario: OwnDeck, series: pd.DataFrame, output: Path) -> pd.DataFrame:
     """Measures by name, one row a row of the log; those that cannot be read are left out.
 
-    ``output``: folder that the deck writes its dumps into.
+    Parameters
+    ----------
+    scenario : OwnDeck
+    series : DataFrame
+        Time in s and the columns of the log, see ``computation.series``.
+    output : Path
+        Folder that the deck wrote its dumps into.
     """
     found = {}
-    time_s = table[CLOCK].to_numpy() if CLOCK in table else np.full(len(table), np.nan)
+    time_s = series["time_s"].to_numpy() if "time_s" in series else np.full(len(series), np.nan)
     for name, taken in scenario.taken.items():
-        if not taken.dump and taken.of in table:
-            found[name] = over_window(time_s, table[taken.of].to_numpy(), taken)
-        elif taken.dump and len(table) and (each := dict(_moments(output, taken))):
-            steps, step = table[STEP].to_numpy(), np.array(sorted(each))
+        if not taken.dump and LOGGED + taken.of in series:
+            found[name] = over_window(time_s, series[LOGGED + taken.of].to_numpy(), taken)
+        elif taken.dump and len(series) and (each := dict(_moments(output, taken))):
+            steps, step = series[LOGGED + STEP].to_numpy(), np.array(sorted(each))
             values = np.array([each[one] for one in step])
             values = over_window(np.interp(step, steps, time_s), values, taken)
             newest = np.searchsorted(step, steps, side="right") - 1
             found[name] = np.where(newest < 0, np.nan, values[newest])
-    return pd.DataFrame(found, index=table.index)
+    return pd.DataFrame(found, index=series.index)
 
 
 def over_window(
@@ -56,14 +62,11 @@ def over_window(
     return np.where(first > now, np.nan, per_s)
 
 
-def missing_dump(scenario: OwnDeck, output: Path) -> str:
-    """Say which measures cannot be read from a dump; nothing where all can."""
-    lacks = [
-        f"{taken.dump} with {taken.of} (measures.{name})"
-        for name, taken in scenario.taken.items()
-        if taken.dump and not any(_moments(output, taken))
-    ]
-    return f"the deck wrote no {', '.join(lacks)}" if lacks else ""
+def missing_dumps(scenario: OwnDeck, output: Path) -> Iterator[tuple[str, Taken]]:
+    """Measures that cannot be read from a dump, by name."""
+    for name, taken in scenario.taken.items():
+        if taken.dump and not any(_moments(output, taken)):
+            yield name, taken
 
 
 def _moments(output: Path, taken: Taken) -> Iterator[tuple[int, float]]:

@@ -10,6 +10,8 @@ from pathlib import Path
 import pandas as pd
 
 STEP = "Step"
+LOGGED = "log_"
+"""Begins the names of the log's own columns in ``series.tsv``."""
 _LOOP = re.compile(
     r"^Loop time of (\d+\.?\d*(?:e[-+]?\d+)?) on \d+ procs for (\d+) steps with (\d+) atoms",
     re.MULTILINE,
