@@ -96,8 +96,8 @@ class Planning(ABC, Generic[ScenarioT]):
         """State of all that says how a run is measured."""
         return self.measuring_hash
 
-    def unmeasurable(self, scenario: ScenarioT, folder: Path) -> list[Problem]:
-        """Measures that are asked of a run and that what it left cannot give."""
+    def unmeasurable(self, scenario: ScenarioT, folder: Path) -> list[str]:
+        """Names of ``measures`` of a scenario that what its run left cannot give."""
         return []
 
     def resolved(self, scenario: ScenarioT) -> ScenarioT:

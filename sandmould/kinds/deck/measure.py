@@ -7,40 +7,33 @@ from pathlib import Path
 
 import pandas as pd
 
-from sandmould.bad_input import Problem
 from sandmould.definition.run import LAST_MEASURED, PICTURE
 from sandmould.kinds.deck.own.deck import OUTPUT
-from sandmould.kinds.deck.own.measures import measured, missing_dumps
-from sandmould.kinds.deck.own.thermo import LOGGED
+from sandmould.kinds.deck.own.measures import measured
 from sandmould.runs.files import replaced
 from sandmould.scenario.own_deck import OwnDeck
 
 
 def measure_deck(scenario: OwnDeck, folder: Path) -> None:
     """Write the measures against time."""
-    series = pd.read_csv(folder / "series.tsv", sep="\t")
+    series, each = _measured(scenario, folder)
     time_s = series["time_s"] if "time_s" in series else pd.Series(dtype=float)
     clock = {"time_s": time_s, "vibration_time_s": math.nan, "stage": "deck"}
-    table = pd.DataFrame({**clock, **measured(scenario, series, folder / OUTPUT)})
+    table = pd.DataFrame({**clock, **each})
     with replaced(folder / LAST_MEASURED) as partial:
         table.to_csv(partial, sep="\t", index=False)
 
 
-def unmeasurable(scenario: OwnDeck, folder: Path) -> list[Problem]:
-    """Measures that cannot be read from what a run left."""
-    columns = map(str, pd.read_csv(folder / "series.tsv", sep="\t", nrows=0))
-    has = [name.removeprefix(LOGGED) for name in columns if name.startswith(LOGGED)]
-    valid = f"a column of the log of the runs that have ended: {', '.join(has)}"
-    wrong = [
-        Problem(f"measures.{name}", column, valid)
-        for name, column in scenario.columns.items()
-        if column not in has
-    ]
-    of_dump = "a column of a dump that the runs which have ended wrote"
-    return wrong + [
-        Problem(f"measures.{name}", f"{taken.of} of {taken.dump}", of_dump)
-        for name, taken in missing_dumps(scenario, folder / OUTPUT)
-    ]
+def unmeasurable(scenario: OwnDeck, folder: Path) -> list[str]:
+    """Names of the measures that cannot be read from what a run left."""
+    _, each = _measured(scenario, folder)
+    return [name for name in scenario.measures if name not in each]
+
+
+def _measured(scenario: OwnDeck, folder: Path) -> tuple[pd.DataFrame, pd.DataFrame]:
+    """Log of a run and its measures, one row a row of the log."""
+    series = pd.read_csv(folder / "series.tsv", sep="\t")
+    return series, measured(scenario, series, folder / OUTPUT)
 
 
 def draw_measures(scenario: OwnDeck, folder: Path) -> None:

@@ -73,7 +73,7 @@ class DeckPlanning(Planning[OwnDeck]):
         asked = scenario.model_dump_json(include={"measures"})
         return digest(super().measured_by(scenario), asked)[:SHORT]
 
-    def unmeasurable(self, scenario: OwnDeck, folder: Path) -> list[Problem]:
+    def unmeasurable(self, scenario: OwnDeck, folder: Path) -> list[str]:
         """Measures whose columns stand neither in the log of a run nor in its dumps."""
         from sandmould.kinds.deck import measure
 

@@ -244,8 +244,7 @@ def _sound_runs(study: OpenStudy, results: Path) -> tuple[list[Run], list[Run]]:
         if problem is not None:
             problem = _at_stated_key(study, run, problem)
             problems[str(problem)] = problem
-    unmeasurable = (replace(p, key=f"scenario.{p.key}") for p in _unmeasurable(runs, folder))
-    for problem in (*problems_elsewhere(study.study, results), *unmeasurable):
+    for problem in (*problems_elsewhere(study.study, results), *_unmeasurable(runs, folder)):
         found = replace(problem, file=study.origin.file_of(problem.key))
         problems[str(found)] = found
     if problems:
@@ -258,7 +257,12 @@ def _unmeasurable(runs: Sequence[Run], folder: Path) -> list[Problem]:
     ended = next((run for run in runs if (folder / run.place / OUTCOME_FILE).exists()), None)
     if ended is None or lack_of(ended, folder / ended.place).need is not Need.MEASURE:
         return []
-    return kind_of(ended.scenario).planning.unmeasurable(ended.scenario, folder / ended.place)
+    place = folder / ended.place
+    valid = f"a column that {place / 'series.tsv'} has as log_<column>, or that a dump there has"
+    return [
+        Problem(f"scenario.measures.{name}", ended.scenario.measures[name], valid)
+        for name in kind_of(ended.scenario).planning.unmeasurable(ended.scenario, place)
+    ]
 
 
 def checked_plan(path: Path, text: str | None = None) -> Plan:

@@ -295,7 +295,7 @@ def test_a_deck_is_only_measured_again_where_another_measure_is_asked(
     monkeypatch.chdir(tmp_path / "edited")
     more = STUDIES["deck"].replace("KinEng}", "KinEng, potential_j: PotEng}")
     Path("deck.yaml").write_text(more, encoding="utf-8")
-    with pytest.raises(BadInputError, match=r"potential_j.*log of the runs that have ended"):
+    with pytest.raises(BadInputError, match=r"potential_j = 'PotEng'.*series.tsv has as"):
         open_plan(Path("deck.yaml"))
     for series in RESULTS.glob("deck/runs/*/series.tsv"):
         series.write_text("time_s\tlog_Step\tlog_KinEng\tlog_PotEng\n", encoding="utf-8")

@@ -15,7 +15,7 @@ from sandmould.engines.registry import deck_reader, engine_module
 from sandmould.engines.session import EngineStop
 from sandmould.kinds.deck.own.columns import missing_columns
 from sandmould.kinds.deck.own.deck import OUTPUT, RESTART_FILES, check_unchanged, names_used, render
-from sandmould.kinds.deck.own.measures import missing_dumps
+from sandmould.kinds.deck.own.measures import missing_dump
 from sandmould.kinds.deck.own.thermo import LOGGED, STEP, Thermo, read_thermo
 from sandmould.runs.outcome import Outcome, RunOutcome
 from sandmould.runs.products import Computed, Cost, cpu_time_s, peak_memory_bytes
@@ -85,7 +85,7 @@ def compute(scenario: OwnDeck, folder: Path, run: str, study: str) -> Computed:
     thermo = read_thermo(_logs(work))
     if outcome is Outcome.FINISHED:
         missing = missing_columns(scenario, [str(column) for column in thermo.table])
-        missing = missing or _missing_dumps(scenario, output)
+        missing = missing or missing_dump(scenario, output)
         if said := missing or _wrong_end(scenario, thermo, bool(restart)):
             outcome, detail = Outcome.BAD_INPUT, said
     cost.version = str(engine.installed_version())
@@ -99,15 +99,6 @@ def compute(scenario: OwnDeck, folder: Path, run: str, study: str) -> Computed:
     last_s = float(thermo.table[CLOCK].iloc[-1]) if CLOCK in thermo.table else 0.0
     detail = "; ".join([detail, *notes] if detail else notes)
     return Computed(RunOutcome(outcome, detail, last_s, last_s), cost, is_root)
-
-
-def _missing_dumps(scenario: OwnDeck, output: Path) -> str:
-    """Say which measures cannot be read from a dump; nothing where all can."""
-    lacks = [
-        f"{taken.dump} with {taken.of} (measures.{name})"
-        for name, taken in missing_dumps(scenario, output)
-    ]
-    return f"the deck wrote no {', '.join(lacks)}" if lacks else ""
 
 
 def _wrong_end(scenario: OwnDeck, thermo: Thermo, went_on: bool) -> str:

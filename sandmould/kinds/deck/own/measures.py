@@ -62,11 +62,14 @@ def over_window(
     return np.where(first > now, np.nan, per_s)
 
 
-def missing_dumps(scenario: OwnDeck, output: Path) -> Iterator[tuple[str, Taken]]:
-    """Measures that cannot be read from a dump, by name."""
-    for name, taken in scenario.taken.items():
-        if taken.dump and not any(_moments(output, taken)):
-            yield name, taken
+def missing_dump(scenario: OwnDeck, output: Path) -> str:
+    """Say which measures cannot be read from a dump; nothing where all can."""
+    lacks = [
+        f"{taken.dump} with {taken.of} (measures.{name})"
+        for name, taken in scenario.taken.items()
+        if taken.dump and not any(_moments(output, taken))
+    ]
+    return f"the deck wrote no {', '.join(lacks)}" if lacks else ""
 
 
 def _moments(output: Path, taken: Taken) -> Iterator[tuple[int, float]]:
