@@ -25,6 +25,8 @@ from sandmould.scenario.yaml_text import fault_of, load_planned, load_users
 
 Tree = dict[str, Any]
 ModelT = TypeVar("ModelT", bound=BaseModel)
+MOST_KEYS = 8
+"""Keys of a section that a sentence can name."""
 
 
 def read_planned(path: Path, name: str) -> Tree:
@@ -267,6 +269,8 @@ def _valid(
         hint = f" (did you mean {near[0]}?)" if near else ""
         return f"one of the keys {', '.join(sorted(keys)) or '(none)'}{hint}"
     kinds = standing_kinds(model, tree, parts) if kind == "union_tag_not_found" else []
+    keys = standing_keys(model, tree, parts) if kind == "model_type" else []
+    of_keys = f": {', '.join(keys)}" if 0 < len(keys) <= MOST_KEYS else ""
     limit = next((context[k] for k in ("gt", "ge", "lt", "le") if k in context), None)
     limit = f"{limit:g}" if isinstance(limit, float) else limit
     expected = str(context.get("expected"))
@@ -288,7 +292,7 @@ def _valid(
         "tuple_type": "a list",
         "list_type": "a list",
         "dict_type": "a mapping",
-        "model_type": "a mapping of keys to values",
+        "model_type": f"a mapping of keys to values{of_keys}",
         "model_attributes_type": "a mapping of keys to values",
         "too_short": f"a list of at least {context.get('min_length')} entries",
         "too_long": f"a list of at most {context.get('max_length')} entries",

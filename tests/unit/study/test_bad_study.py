@@ -76,7 +76,12 @@ CASES: dict[str, tuple[str | bytes, str]] = {
     "swept key without a list": (
         "based_on: tube\nsweep: {keys: {sand.size_scale: 4}}",
         "trial.yaml: sweep.keys.sand.size_scale = 4 cannot be used: "
-        "valid is a list or a mapping of keys to values.",
+        "valid is a list or a mapping of keys to values: high, low, number, spacing.",
+    ),
+    "measure without its key": (
+        "based_on: tube\nobjective: {beside: [solid_fraction]}",
+        "trial.yaml: objective.beside.0 = 'solid_fraction' cannot be used: "
+        "valid is a mapping of keys to values: better, measure, target.",
     ),
     "missing base": (
         "based_on: tuba",
