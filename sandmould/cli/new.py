@@ -23,7 +23,10 @@ def new(
     ] = None,
     frequency_hz: Annotated[
         tuple[float, float] | None,
-        typer.Option(metavar="FROM TO", help="Speeds of the table, in Hz: rpm divided by 60."),
+        typer.Option(
+            metavar="FROM TO",
+            help="Speeds of the table, in Hz: rpm divided by 60. Twice the same: one speed.",
+        ),
     ] = None,
     acceleration_g: Annotated[
         float | None, typer.Option(help="It stays the same at every speed, in g.")
@@ -33,6 +36,9 @@ def new(
     ] = None,
     amplitude_mm: Annotated[
         float | None, typer.Option(help="It stays the same: half of the table's stroke, in mm.")
+    ] = None,
+    largest_acceleration_g: Annotated[
+        float | None, typer.Option(help="Most that the table bears, in g: faster is left out.")
     ] = None,
     unbalance: Annotated[
         tuple[float, float] | None,
@@ -62,8 +68,11 @@ def new(
     """Write a short study with a comment on each line, to change it."""
     options = {k: v for k, v in locals().items() if v is not None and k not in ("name", "file")}
     from sandmould.reference.new_study import write_new_study
+    from sandmould.runs.formatting import runs_text
 
     path = file or Path(f"my_{name}.yaml")
     plan = write_new_study(name, path, options)
-    typer.echo(f"{path}: {len(plan.runs)} runs. Change what is not yours; each line says how.")
+    typer.echo(
+        f"{path}: {runs_text(len(plan.runs))}. Change what is not yours; each line says how."
+    )
     typer.echo(f"sandmould plan {path} says what they take.")

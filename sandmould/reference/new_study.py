@@ -28,6 +28,7 @@ _SHAKEN = {
     "acceleration_g": 1.5,
     "velocity_mm_s": None,
     "amplitude_mm": None,
+    "largest_acceleration_g": None,
 }
 _HOLE = {**_SHAKEN, "unbalance": None, "box_mm": (120.0, 110.0)}
 _OPTIONS: dict[str, dict[str, Any]] = {
@@ -54,7 +55,7 @@ _ELEMENTS = 8
 _MOST_ELEMENTS = 32
 """The same where its walls are thin (argued)."""
 _FOAM_M = 0.016
-"""Longest element of foam: that of the shipped bracket."""
+"""Longest element of foam where no wall is thinner: that of the shipped bracket."""
 _GATE_M = 0.01
 """Half the width of the gating that a part hangs from: that of the shipped bracket."""
 
@@ -118,7 +119,10 @@ def _problems(name: str, given: dict[str, Any]) -> Iterator[Problem]:
         elif any(isinstance(n, float) and not 0 < n < np.inf for n in amounts):
             yield Problem(key, value, "greater than 0")
     if len(held := [_flag(option) for option in _HELD if option in given]) > 1:
-        sentence = f"give one of {' and '.join(held)}: only one can stay the same at every speed"
+        sentence = (
+            f"give one of {' and '.join(held)}: only one can stay the same at every speed. "
+            "A limit of the table in g is --largest-acceleration-g"
+        )
         yield Problem(held[0], None, "", sentence=sentence)
     if "hole_mm" in _OPTIONS[name]:
         values = _OPTIONS[name] | given
@@ -135,6 +139,7 @@ def _flag(option: str) -> str:
 
 def _placed(drawing: Path) -> dict[str, Any]:
     """Box, elements and gating for a part, or its mould."""
+    from sandmould.geometry.mesh import TriangleMesh
     from sandmould.geometry.mesh_file import read_surface  # slow to import
     from sandmould.pattern_fe.nearest import nearest_on_facets
 
@@ -157,12 +162,13 @@ def _placed(drawing: Path) -> dict[str, Any]:
     element_m = max(round(float(size_m.min()) / _ELEMENTS, 4), 1e-4)
     cells = np.ceil((size_m + 2 * _ROOM_M) / element_m)
     mould_low_m = low_m - _ROOM_M
+    wall = thinnest_wall([TriangleMesh("part", unit_m * vertices, triangles)], _FOAM_M / 1.5)
     found = {
         "box_m": size_m + _ROOM_M * np.array([2, 2, 4]),
         "position_m": position_m,
         "gate_m": np.array([gate_m - half_m, gate_m + half_m]),
         "layer_m": (size_m[2] + 2 * _ROOM_M) / 2,
-        "foam_m": min(size_m.min(), _FOAM_M),
+        "foam_m": max(1.5 * wall.thickness_m, 0.5 * _FOAM_M) if wall else _FOAM_M,
         "element_m": element_m,
         "mould_m": np.array([mould_low_m, mould_low_m + cells * element_m]),
     }

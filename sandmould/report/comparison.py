@@ -17,7 +17,15 @@ from sandmould.drawing.chart import NARROW, WIDE, Chart, Line, Mark, lay_out, ti
 from sandmould.drawing.templates import page_environment
 from sandmould.report.tables import Cell, Column, Table
 from sandmould.runs.files import write_text
-from sandmould.runs.formatting import display_scale, is_number, listed, name_of, titled, with_margin
+from sandmould.runs.formatting import (
+    display_scale,
+    is_number,
+    listed,
+    name_of,
+    runs_text,
+    titled,
+    with_margin,
+)
 from sandmould.statistics.settings import Setting
 from sandmould.statistics.verdict import FEW, compare_settings
 from sandmould.study.collect import Collected, read_collected, read_study
@@ -142,7 +150,7 @@ class SideBySide:
                     continue
                 reach = factor * setting.ci_half_width if setting.n >= FEW else math.nan
                 mean = with_margin(setting.mean, setting.ci_half_width)
-                title = f"{each.name}, {label}: mean {mean}, {setting.n} runs"
+                title = f"{each.name}, {label}: mean {mean}, {runs_text(setting.n)}"
                 y = factor * setting.mean
                 if self.key:
                     x = float(setting.values[self.key])
@@ -180,8 +188,8 @@ class SideBySide:
 def _mean_cell(setting: Setting | None) -> Cell:
     if setting is None or not setting.n:
         return Cell("–", "nan")
-    runs = "1 run" if setting.n == 1 else f"{setting.n} runs"
-    return Cell(f"{with_margin(setting.mean, setting.ci_half_width)} ({runs})", str(setting.mean))
+    mean = with_margin(setting.mean, setting.ci_half_width)
+    return Cell(f"{mean} ({runs_text(setting.n)})", str(setting.mean))
 
 
 def _value_text(stated: dict[str, Any], key: str) -> str:

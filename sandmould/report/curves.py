@@ -18,6 +18,7 @@ from sandmould.runs.formatting import (
     is_number,
     name_of,
     number,
+    runs_text,
     setting_text,
     titled,
     value_text,
@@ -271,12 +272,12 @@ def _run_marks(rows: pd.DataFrame, verdict: Verdict, tint: Tint) -> list[Mark]:
 def _mean_mark(setting: Setting, x: float, y: float, tint: Tint, factor: float) -> Mark:
     reach = setting.ci_half_width
     mean = with_margin(setting.mean, reach)
-    title = f"{setting.label}: mean {mean}, {setting.n} runs"
+    title = f"{setting.label}: mean {mean}, {runs_text(setting.n)}"
     # Student's t of two runs is 13 standard errors: a bar that tells nothing of the sand.
     drawn = factor * reach if setting.n >= FEW else math.nan
     return Mark(x, y, "mean", tint, drawn, title)
 
 
 def _settings_alt(verdict: Verdict) -> str:
-    parts = [f"{s.label}: {number(s.mean)}, {s.n} runs" for s in verdict.settings if s.n]
+    parts = [f"{s.label}: {number(s.mean)}, {runs_text(s.n)}" for s in verdict.settings if s.n]
     return f"Mean {name_of(verdict.measure)} by setting. {'; '.join(parts)}."

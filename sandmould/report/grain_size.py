@@ -12,6 +12,7 @@ from sandmould.report.tables import Cell, Column, Table
 from sandmould.runs.columns import RUN, VIBRATION_TIME_S, during_vibration
 from sandmould.runs.formatting import display_number, display_range, name_of
 from sandmould.scenario.scenario import Scenario
+from sandmould.statistics.decision import aims_beside
 from sandmould.statistics.grain_change import GrainChange, grain_changes
 from sandmould.statistics.grain_check import FACTOR
 from sandmould.statistics.over_time import first_reach_s
@@ -55,7 +56,8 @@ def grain_size_pages(
         Label of the best setting.
     """
     objective = study.objective
-    asked = (objective.measure, *(aim.measure for aim in objective.beside))
+    aims = aims_beside(objective.measure, objective.beside, collected.summary)
+    asked = (objective.measure, *(aim.measure for aim in aims))
     measures = [m for m in dict.fromkeys((*asked, *ALSO)) if m in collected.summary]
     summary = _with_times(collected, objective.measure)
     measures += [column for column in (FILLED_S,) if column in summary]
@@ -66,8 +68,9 @@ def grain_size_pages(
     if not of_objective or of_objective[0].label != best:
         return None
     narrow = [name for space in narrow_spaces(scenario) for name in space.names]
+    beside = [c for c in changes if c.measure in asked[1:] and c.label == best]
     short, said = (
-        grain_sentences(of_objective, objective.better, narrow, is_short)
+        grain_sentences(of_objective, beside, objective.better, narrow, is_short)
         for is_short in (True, False)
     )
     return GrainSizePages(short, said, _table(changes))

@@ -47,7 +47,6 @@ from sandmould.runs.files import replaced, write_text
 from sandmould.runs.formatting import name_of, setting_text
 from sandmould.runs.templates import Note, notes
 from sandmould.scenario.drive import BoxDrive
-from sandmould.scenario.quantity import Section
 from sandmould.statistics.answer import Asked
 from sandmould.statistics.decision import Evidence, decide
 from sandmould.statistics.settings import setting_rows
@@ -55,6 +54,7 @@ from sandmould.statistics.verdict import compare_settings
 from sandmould.study.collect import Collected, read_collected, read_provenance, read_study
 from sandmould.study.plan.ownership import owner_of, shipped_name
 from sandmould.study.plan.plan_files import FIGURES, SPHERES, STUDY_FILE, VERDICT_FILE, read_run
+from sandmould.study.plan.stand_ins import stand_ins
 from sandmould.study.rounds.round_log import read_rounds
 from sandmould.wording.answer import detail_sentences, first_sentence, limit_sentences, reasons_text
 from sandmould.wording.next_steps import (
@@ -68,8 +68,6 @@ from sandmould.wording.next_steps import (
     with_file,
 )
 
-STAND_IN = "stand-in"
-"""How the source of a value begins that is not what it stands for."""
 LIMIT_BYTES = 15_000_000
 
 
@@ -141,9 +139,9 @@ def _page(study_folder: Path, home: Path, study: Study, collected: Collected) ->
         for s in verdict.settings
         if s.label in drives
     }
-    stand_ins = _stand_ins(study_folder, summary[RUN], kind_named(study.kind).material)
     curves = collected.of_sweep.curves
-    answer = decide(asked, Evidence(summary, curves, of_varied, stand_ins, study.table_limit_at))
+    placeholders = _stand_ins(study_folder, summary[RUN])
+    answer = decide(asked, Evidence(summary, curves, of_varied, placeholders, study.table_limit_at))
     relative = os.path.relpath(study_folder.absolute(), home)
     href = "" if relative == "." else quote(Path(relative).as_posix()) + "/"
     scenario = _scenario_of(study_folder, [pictured_run] if pictured_run else []) or any_scenario
@@ -152,19 +150,11 @@ def _page(study_folder: Path, home: Path, study: Study, collected: Collected) ->
     )
 
 
-def _stand_ins(
-    study_folder: Path, runs: Iterable[str], material: type[Section] | None
-) -> tuple[str, ...]:
-    """Values of materials that are not what they stand for, by their sources in the first run."""
-    sections = set(material.model_fields) if material else set()
+def _stand_ins(study_folder: Path, runs: Iterable[str]) -> tuple[str, ...]:
+    """Values of materials that are not what they stand for, in the first run that can be read."""
     for run in runs:
         with contextlib.suppress(BadInputError, OSError):
-            sources = read_run(study_folder / "runs" / str(run) / "scenario.yaml").sources
-            return tuple(
-                key
-                for key, source in sources.items()
-                if key.partition(".")[0] in sections and source.startswith(STAND_IN)
-            )
+            return stand_ins(read_run(study_folder / "runs" / str(run) / "scenario.yaml"))
     return ()
 
 

@@ -18,6 +18,7 @@ from sandmould.runs.files import replaced
 from sandmould.runs.formatting import distinct_names, is_number, unit_of
 from sandmould.scenario.drive import ACCELERATION, DISPLACEMENT, VELOCITY
 from sandmould.scenario.units import ZERO_K
+from sandmould.statistics.decision import aims_beside
 from sandmould.statistics.verdict import compare_settings
 from sandmould.study.collect import read_collected, read_study
 
@@ -30,7 +31,7 @@ _WIDEST = 40
 
 
 def write_spreadsheet(study_folder: Path, out: Path) -> None:
-    """Write a sheet of settings, with the mean of the objective, and a sheet of all runs.
+    """Write a sheet of settings, with means of what they are judged by, and one of all runs.
 
     Numbers are cells of numbers, whatever the language of the program that opens them.
 
@@ -43,22 +44,31 @@ def write_spreadsheet(study_folder: Path, out: Path) -> None:
     """
     objective, collected = read_study(study_folder).objective, read_collected(study_folder)
     keys, summary = collected.keys, collected.of_sweep.summary
-    verdict = compare_settings(summary, keys, objective.measure, objective.better)
+    aims = [objective, *aims_beside(objective.measure, objective.beside, summary)]
+    verdicts = [compare_settings(summary, keys, a.measure, a.better).settings for a in aims]
     drive = [each for each in (DISPLACEMENT, VELOCITY, ACCELERATION) if each in summary]
-    factor, offset = _conversion(objective.measure)
     rows = []
-    for setting in verdict.settings:
-        moved = runs_of(summary, setting)[drive].mean()
-        mean, reach = factor * setting.mean + offset, factor * setting.ci_half_width
-        shown = [_shown(key, setting.values[key]) for key in keys]
+    for judged in zip(*verdicts, strict=True):
+        first = judged[0]
+        moved = runs_of(summary, first)[drive].mean()
+        shown = [_shown(key, first.values[key]) for key in keys]
         shown += [_shown(each, moved[each]) for each in drive]
-        rows.append([*shown, mean, mean - reach, mean + reach, setting.n, setting.planned])
-    heads = _heads([*keys, *drive, objective.measure])
+        for aim, setting in zip(aims, judged, strict=True):
+            reach = setting.ci_half_width
+            ends = (setting.mean, setting.mean - reach, setting.mean + reach)
+            shown += [_shown(aim.measure, each) for each in ends]
+        rows.append([*shown, first.n, first.planned])
+    stated = [*keys, *drive]
+    heads = _heads([*stated, *(aim.measure for aim in aims)])
+    means = [
+        f"{before}{head}{after}"
+        for head in heads[len(stated) :]
+        for before, after in (("mean ", ""), ("", ", 95 % from"), ("", ", 95 % to"))
+    ]
     book = Workbook()
     settings = book.worksheets[0]
     settings.title = "settings"
-    ends = [f"{heads[-1]}, 95 % {end}" for end in ("from", "to")]
-    _fill(settings, [*heads[:-1], f"mean {heads[-1]}", *ends, "runs", "planned"], rows)
+    _fill(settings, [*heads[: len(stated)], *means, "runs", "planned"], rows)
     columns = list(map(str, collected.summary.columns))
     every = collected.summary.itertuples(index=False)
     _fill(

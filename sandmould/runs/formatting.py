@@ -314,6 +314,11 @@ def size(value_bytes: float) -> str:
     )
 
 
+def runs_text(count: int) -> str:
+    """So many runs."""
+    return "1 run" if count == 1 else f"{count} runs"
+
+
 def listed(items: list[str], most: int = 4) -> str:
     """Items as a sentence lists them: ``a, b and c``; of too many the first, and how many more."""
     if len(items) > most:

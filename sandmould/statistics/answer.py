@@ -26,6 +26,7 @@ BENDING = (
 )
 """Measures of how far a pattern is bent."""
 OUTSIDE = "pattern_outside_tolerance_fraction"
+FARTHEST = "pattern_distance_largest_m"
 MOST_QUARTERS = 16
 """Quarters of the vibration, four times as long, after which longer is no advice (argued)."""
 NEARLY_EMPTY = 0.05
@@ -105,6 +106,8 @@ class Answer:
     """Of the best setting over its vibration."""
     outside: float | None = None
     """Share of a bending pattern's surface beyond its tolerance at that setting, where known."""
+    farthest_m: float | None = None
+    """Largest distance of that surface from the drawing, where known."""
     left_out: Mapping[str, int] = field(default_factory=dict)
     """Runs that do not count, by reason."""
     one_way: int = 0

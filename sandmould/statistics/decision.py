@@ -11,7 +11,16 @@ import pandas as pd
 from sandmould.runs.columns import OF_RUN, RUN
 from sandmould.runs.formatting import OF_BED, filled_space, is_number, setting_text
 from sandmould.scenario.drive import BoxDrive
-from sandmould.statistics.answer import BENDING, OUTSIDE, TIP, Answer, Asked, Decided, SweepEnd
+from sandmould.statistics.answer import (
+    BENDING,
+    FARTHEST,
+    OUTSIDE,
+    TIP,
+    Answer,
+    Asked,
+    Decided,
+    SweepEnd,
+)
 from sandmould.statistics.config import Aim, Goal
 from sandmould.statistics.evidence import left_out_counts, one_way_runs, usable_values
 from sandmould.statistics.over_time import passage_of, reached_s
@@ -44,19 +53,21 @@ def decide(asked: Asked, evidence: Evidence) -> Answer:
     answer = _decide_one(asked, evidence)
     if asked.better == "neither":
         return answer
-    beside = (_decide_one(each, evidence) for each in _asked_beside(asked, evidence.summary))
+    aims = aims_beside(asked.measure, asked.beside, evidence.summary)
+    each = (replace(asked, measure=a.measure, better=a.better, goal=a.goal) for a in aims)
+    beside = (_decide_one(one, evidence) for one in each)
     return replace(answer, beside=tuple(a for a in beside if a.used))
 
 
-def _asked_beside(asked: Asked, summary: pd.DataFrame) -> list[Asked]:
-    """What is asked besides, and of the other cavities, to be full, and of a pattern's tip."""
-    aims = list(asked.beside)
-    told = {filled_space(measure) for measure in (asked.measure, *(a.measure for a in aims))}
+def aims_beside(measure: str, beside: Sequence[Aim], summary: pd.DataFrame) -> list[Aim]:
+    """What settings are judged by besides a measure: what is asked, other cavities, a pattern."""
+    aims = list(beside)
+    told = {filled_space(each) for each in (measure, *(a.measure for a in aims))}
     shares = [str(column) for column in summary if str(column).endswith(OF_BED)]
     aims += [Aim(measure=share) for share in shares if filled_space(share) not in told]
     if TIP in summary and not any(measure.startswith("pattern_") for measure in told):
         aims.append(Aim(measure=TIP, better="smaller"))
-    return [replace(asked, measure=a.measure, better=a.better, goal=a.goal) for a in aims]
+    return aims
 
 
 def _decide_one(asked: Asked, evidence: Evidence) -> Answer:
@@ -134,11 +145,17 @@ def _with_course(
 ) -> Answer:
     """With how a setting went on over its vibration, and where that left a pattern."""
     runs, measure = _runs(summary, answer.asked, setting), answer.asked.measure
-    outside = None
-    if measure in BENDING and OUTSIDE in summary:
-        known = summary.loc[summary[RUN].astype(str).isin(runs), OUTSIDE].dropna()
-        outside = float(known.mean()) if len(known) else None
-    return replace(answer, passage=passage_of(evidence.curves, runs, measure), outside=outside)
+    means = dict[str, float]()
+    if measure in BENDING:
+        rows = summary[summary[RUN].astype(str).isin(runs)]
+        known = {name: rows[name].dropna() for name in (OUTSIDE, FARTHEST) if name in rows}
+        means = {name: float(values.mean()) for name, values in known.items() if len(values)}
+    return replace(
+        answer,
+        passage=passage_of(evidence.curves, runs, measure),
+        outside=means.get(OUTSIDE),
+        farthest_m=means.get(FARTHEST),
+    )
 
 
 def _with_target(answer: Answer, goal: Goal, evidence: Evidence, summary: pd.DataFrame) -> Answer:

@@ -17,6 +17,7 @@ from sandmould.runs.formatting import (
     listed,
     name_of,
     number,
+    runs_text,
     seconds,
     unit_of,
     value_text,
@@ -66,16 +67,19 @@ def limit_sentences(answer: Answer) -> tuple[str, ...]:
 
 
 def sand_limits(
-    keys: Sequence[str], stage: VibrationStage | None, is_unchecked: bool
+    keys: Sequence[str], stage: VibrationStage | None, is_unchecked: bool, has_coarser: bool
 ) -> tuple[str, ...]:
     """What a sweep over sand leaves open: what the vibration held constant, and the springs.
 
-    ``is_unchecked``: whether the best setting was looked for and its controls have not been run.
+    ``is_unchecked``: whether the best setting was looked for and its controls have not been run;
+    ``has_coarser``: whether it was computed with coarser grains, too.
     """
     swept = {key.rpartition(".")[2] for key in keys}
     is_held = "frequency_hz" in swept and not swept.intersection(OF_DRIVE[1:])
     hold = stage.hold if stage and is_held else ""
-    return sentences("sand_limits.j2", hold=hold, is_unchecked=is_unchecked)
+    return sentences(
+        "sand_limits.j2", hold=hold, is_unchecked=is_unchecked, has_coarser=has_coarser
+    )
 
 
 def reasons_text(left_out: Mapping[str, int]) -> str:
@@ -225,7 +229,7 @@ class AnswerWords:
         """How well a value of one setting is known."""
         (setting,) = self.answer.used[:1]
         if setting.n > 1:
-            return f"{setting.n} runs"
+            return runs_text(setting.n)
         by_lot = self.answer.asked.by_lot
         return f"its error is unknown: {'one run' if by_lot else 'one size of elements or steps'}"
 

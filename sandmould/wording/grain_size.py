@@ -10,7 +10,11 @@ from sandmould.statistics.grain_check import FACTOR
 
 
 def grain_sentences(
-    changes: Sequence[GrainChange], better: str, narrow: Sequence[str], is_short: bool
+    changes: Sequence[GrainChange],
+    beside: Sequence[GrainChange],
+    better: str,
+    narrow: Sequence[str],
+    is_short: bool,
 ) -> tuple[str, ...]:
     """Say what coarser grains change, what finer ones should give, and what is not known.
 
@@ -18,6 +22,8 @@ def grain_sentences(
     ----------
     changes : sequence of GrainChange
         Of the objective, at the best setting and, where it was computed, at the next; not empty.
+    beside : sequence of GrainChange
+        Of what else is judged, at the best setting.
     narrow : sequence of str
         Tubes and cavities that fewer than five of the largest grains fit across.
     is_short : bool
@@ -26,7 +32,7 @@ def grain_sentences(
     return sentences(
         "grain_size.j2",
         changes=changes,
-        shown=changes[:1] if is_short else changes,
+        shown=[*(changes[:1] if is_short else changes), *beside],
         factor=f"{FACTOR:g}",
         two=len(changes) > 1,
         order=order_of(changes[0], changes[1], better) if len(changes) > 1 else "",

@@ -187,16 +187,17 @@ def certificate_steps(study: Study, answer: Answer) -> list[NextStep]:
     return [step("certificate", "certificate: {controls: [springs, hold, time_step]}")]
 
 
-def narrow_steps(study: Study, spaces: Sequence[Narrow]) -> list[NextStep]:
-    """Finer grains, where what is judged is too narrow for those of the model."""
-    if SIZE_SCALE in study.sweep.swept:
+def narrow_steps(study: Study, answer: Answer, spaces: Sequence[Narrow]) -> list[NextStep]:
+    """Finer grains, where the narrowest space that is judged is too narrow for the model's."""
+    measures = (each.asked.measure for each in (answer, *answer.beside))
+    judged = {filled_space(measure).replace("_", " ") for measure in measures}
+    of_judged = [it for it in spaces if judged & set(it.names) and it.scale >= 1.0]
+    if SIZE_SCALE in study.sweep.swept or not of_judged:
         return []
-    judged = filled_space(study.objective.measure).replace("_", " ")
-    return [
-        step("narrow", f"scenario: {{sand: {{size_scale: {it.scale:g}}}}}", space=judged, it=it)
-        for it in spaces
-        if judged in it.names and it.scale >= 1.0
-    ]
+    it = min(of_judged, key=lambda it: it.scale)
+    space = next(name for name in it.names if name in judged)
+    line = f"scenario: {{sand: {{size_scale: {it.scale:g}}}}}"
+    return [step("narrow", line, space=space, it=it)]
 
 
 def sand_steps(study: Study, is_sound: bool) -> list[NextStep]:

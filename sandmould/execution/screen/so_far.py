@@ -13,7 +13,7 @@ from sandmould.definition.study import Study
 from sandmould.kinds.registry import kind_named
 from sandmould.plain_file import UNREADABLE
 from sandmould.runs.columns import RUN
-from sandmould.runs.formatting import display_number, display_range, name_of
+from sandmould.runs.formatting import display_number, display_range, name_of, runs_text
 from sandmould.statistics.agreement import sweep_part
 from sandmould.statistics.evidence import usable_values
 from sandmould.statistics.settings import Setting, setting_rows
@@ -99,7 +99,7 @@ def so_far_text(summary: pd.DataFrame, study: Study, settings: int) -> str:
     if not study.seeks_best:
         low, high = (f(setting.mean for setting in used) for f in (min, max))
         between = display_range(measure, low, high) if low < high else display_number(measure, low)
-        return f"{what} {between} by {_runs(runs)}"
+        return f"{what} {between} by {runs_text(runs)}"
     if len(used) == 1:
         return f"{what} {_mean(verdict.best, measure)}; nothing to compare with yet"
     if not kind_named(study.kind).draws_by_lot:
@@ -119,8 +119,4 @@ def _best(verdict: Verdict, measure: str) -> str:
 
 
 def _mean(setting: Setting, measure: str) -> str:
-    return f"{display_number(measure, setting.mean)} ({_runs(setting.n)})"
-
-
-def _runs(n: int) -> str:
-    return "1 run" if n == 1 else f"{n} runs"
+    return f"{display_number(measure, setting.mean)} ({runs_text(setting.n)})"

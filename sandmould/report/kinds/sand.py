@@ -20,13 +20,21 @@ from sandmould.report.repose_figures import steepest_heaps
 from sandmould.report.robustness import robustness_pages
 from sandmould.report.sand import film_scene, sand_pages
 from sandmould.report.time_series import curve_figures
-from sandmould.runs.columns import LEAST_LIMIT_S, OVERLAP_P99_FRACTION, RUN, TIME_STEP_S, finished
+from sandmould.runs.columns import (
+    LEAST_LIMIT_S,
+    OVERLAP_P99_FRACTION,
+    PART,
+    RUN,
+    TIME_STEP_S,
+    finished,
+)
 from sandmould.runs.formatting import number, setting_text
 from sandmould.runs.templates import worded
 from sandmould.scenario.hardness import DEEP_OVERLAP, LEAST_KAPPA, bed_hardness
 from sandmould.scenario.scenario import Scenario
 from sandmould.statistics.verdict import Verdict
 from sandmould.study.collect import Collected
+from sandmould.study.robustness.controls import COARSER
 from sandmould.wording.answer import sand_limits
 from sandmould.wording.grounds import sand_grounds
 from sandmould.wording.next_steps import narrow_steps
@@ -37,7 +45,8 @@ def _notes(
 ) -> tuple[str, ...]:
     """Steps that were too long, and what the drive and its controls leave open."""
     stage = scenario.vibrations[0] if scenario.vibrations else None
-    notes = sand_limits(collected.keys, stage, seeks_best and not is_controlled)
+    has_coarser = PART in collected.summary and (collected.summary[PART] == COARSER.part).any()
+    notes = sand_limits(collected.keys, stage, seeks_best and not is_controlled, bool(has_coarser))
     return (*_steps_above_limit(collected.summary), *notes)
 
 
@@ -83,7 +92,7 @@ def _pages(findings: Findings[Scenario], film_budget_bytes: int) -> KindPages:
         grounds=sand_grounds(
             scenario, study, verdict, findings.scenarios, grain_size.short if grain_size else ()
         ),
-        steps=tuple(narrow_steps(study, narrow_spaces(scenario))),
+        steps=tuple(narrow_steps(study, findings.answer, narrow_spaces(scenario))),
         warning=_softness(scenario, of_sweep.summary),
     )
 

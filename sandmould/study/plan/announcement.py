@@ -24,6 +24,7 @@ from sandmould.study.plan.plan_files import (
     write_study,
 )
 from sandmould.study.plan.price import Prices, computed_wall_s, ratios_of, study_s
+from sandmould.study.plan.stand_ins import stand_in_line
 from sandmould.study.plan.trust import may_run
 
 MEASURING_S = 10.0
@@ -84,6 +85,7 @@ def price(plan: Plan, results: Path, cores: int) -> str:
     return (
         plan_table([*plan.fills, *plan.runs], prices, cores)
         + beyond_line(plan.beyond_table, plan.study.study.table_limits)
+        + stand_in_line(plan.runs[0])
         + later_lines(plan.later, prices, cores)
     )
 
@@ -96,7 +98,7 @@ def left_line(plan: Plan, results: Path, cores: int) -> str:
     left = [run for run in runs if found.get(run.run, WHOLE).need is Need.COMPUTE]
     ended = len(plan.runs) - sum(run.part != FILL for run in left)
     if not left:
-        return f"All {ended} runs have ended here.\n"
+        return f"All runs have ended here: {ended}.\n"
     prices = known_prices(plan, results)
     pieces = [prices.piece(run) for run in left]
     takes = f"the others take about {duration_text(study_s(pieces, cores))}"

@@ -18,7 +18,14 @@ from sandmould.definition.sweep import Point
 from sandmould.digest import SHORT, digest
 from sandmould.kinds.registry import kind_named, kind_of
 from sandmould.runs.files import write_text
-from sandmould.runs.formatting import listed, name_of, setting_text, size_text, value_text
+from sandmould.runs.formatting import (
+    listed,
+    name_of,
+    runs_text,
+    setting_text,
+    size_text,
+    value_text,
+)
 from sandmould.runs.progress import duration_text
 from sandmould.runs.templates import Note
 from sandmould.scenario.quantity import Section
@@ -209,7 +216,7 @@ def plan_table(runs: Sequence[Run], prices: Prices, cores: int) -> str:
         lines.append(_fills_line(runs, fills))
     whole = duration_text(study_s([prices.piece(run) for run in runs], cores))
     lines.append(
-        f"{len(runs) - len(fills)} runs, {work:.3g} {planning.work_unit}. Wall time on "
+        f"{runs_text(len(runs) - len(fills))}, {work:.3g} {planning.work_unit}. Wall time on "
         f"{cores_text(cores)} with report: {whole}, {prices.basis(runs)}"
     )
     settings = [

@@ -98,7 +98,7 @@ def test_the_smallest_kind_is_planned_computed_and_reported(
         measure_run(of_run)
         known = announce(plan, tmp_path, 1)
         last = run is plan.runs[-1]
-        assert ("All 2 runs have ended here." if last else "1 of 2 runs have ended here;") in known
+        assert ("All runs have ended here: 2." if last else "1 of 2 runs have ended here;") in known
     assert all(lack.need is Need.NOTHING for lack in plan.lacks(tmp_path).values())
     collect(folder)
     summary = pd.read_csv(folder / "summary.tsv", sep="\t")

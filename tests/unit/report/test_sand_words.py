@@ -52,7 +52,7 @@ def test_of_the_best_setting_the_run_in_the_middle_is_pictured(tmp_path: Path) -
     verdict = compare_settings(table, ["f_hz"], FILL)
     assert pictured_runs(tmp_path, table, verdict) == {"best": "d", "worst": "b"}
     assert _role_text("best", verdict, table) == (
-        "in the middle of those with the highest mean fill of the tube"
+        "one of those with the highest mean fill of the tube"
     )
 
 

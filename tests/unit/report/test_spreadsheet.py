@@ -23,6 +23,7 @@ def sheets(study: Path) -> dict[str, pd.DataFrame]:
     summary["drive_displacement_m"] = AMPLITUDE_M
     summary["probe_k"] = 373.15
     summary["detail"] = "=1+1"
+    summary["hole_fill_of_bed_fraction"] = 0.25
     summary.to_csv(study / "summary.tsv", sep="\t", index=False)
     write_spreadsheet(study, study / "report.xlsx")
     book = load_workbook(study / "report.xlsx")
@@ -40,9 +41,11 @@ def test_settings_and_runs_are_read_again_in_units_of_a_foundry(tmp_path: Path) 
     summary = pd.read_csv(study / "summary.tsv", sep="\t")
     verdict = compare_settings(summary, ["vibration.0.frequency_hz"], "tube_fill_fraction")
     settings = tables["settings"]
+    hole = "fill of the hole as a share of what fits"
     assert list(settings.columns) == [
         "frequency, Hz", "amplitude of the box, mm", "mean fill of the tube",
-        "fill of the tube, 95 % from", "fill of the tube, 95 % to", "runs", "planned",
+        "fill of the tube, 95 % from", "fill of the tube, 95 % to", f"mean {hole}",
+        f"{hole}, 95 % from", f"{hole}, 95 % to", "runs", "planned",
     ]  # fmt: skip
     assert list(settings["frequency, Hz"]) == sorted(PLANTED)
     # twelve digits are written
@@ -51,7 +54,8 @@ def test_settings_and_runs_are_read_again_in_units_of_a_foundry(tmp_path: Path) 
         reach = setting.ci_half_width
         ends = [setting.mean - reach, setting.mean + reach]
         assert list(row[2:5]) == pytest.approx([setting.mean, *ends], rel=1e-11)
-        assert list(row[5:]) == [setting.n, setting.planned]
+        assert row[5] == 0.25
+        assert list(row[8:]) == [setting.n, setting.planned]
     runs = tables["runs"]
     assert list(runs["run"]) == list(summary["run"])
     assert list(runs["probe, °C"]) == pytest.approx([100.0] * len(summary), abs=1e-9)

@@ -10,6 +10,7 @@ import pytest
 
 from sandmould.kinds.sand.kind import SandStudy
 from sandmould.kinds.sand.narrow import Narrow
+from sandmould.runs.formatting import filled_space
 from sandmould.statistics.answer import Asked, Decided
 from sandmould.statistics.config import Aim, Goal
 from sandmould.statistics.decision import Evidence, decide
@@ -56,18 +57,22 @@ def test_longer_is_advised_where_it_can_help(
     )
 
 
-def test_finer_grains_are_advised_where_what_is_judged_is_narrow() -> None:
-    narrow = [Narrow(["hole", "slot"], 0.018, 0.008, 3.7)]
-    for measure, swept, told in (
-        (HOLE.replace("hole18", "hole"), HZ, True),
-        (POCKET, HZ, False),
-        (HOLE.replace("hole18", "hole"), "sand.size_scale", False),
+def test_finer_grains_are_advised_for_the_narrowest_space_that_is_judged() -> None:
+    found = answered.two_cavities()
+    judged = [filled_space(a.asked.measure).replace("_", " ") for a in (found, *found.beside)]
+    wide, narrow = (
+        Narrow([judged[0], "slot"], 0.018, 0.008, 3.7),
+        Narrow(judged[1:], 0.01, 0.008, 2),
+    )
+    other = Narrow(["slot"], 0.001, 0.008, 1.1)
+    for spaces, swept, lines in (
+        ([wide, other], HZ, ["scenario: {sand: {size_scale: 3.7}}"]),
+        ([wide, narrow], HZ, ["scenario: {sand: {size_scale: 2}}"]),
+        ([other], HZ, []),
+        ([wide], "sand.size_scale", []),
     ):
-        study = SandStudy.model_validate(
-            {"objective": {"measure": measure}, "sweep": {"keys": {swept: [5, 6]}}}
-        )
-        steps = narrow_steps(study, narrow)
-        assert [each.line for each in steps] == ["scenario: {sand: {size_scale: 3.7}}"] * told
+        study = SandStudy.model_validate({"sweep": {"keys": {swept: [5, 6]}}})
+        assert [each.line for each in narrow_steps(study, found, spaces)] == lines
 
 
 def test_several_reach_it_and_one_is_gentlest_another_shortest() -> None:
