@@ -6,6 +6,7 @@ imported in its body, so that no verb waits for the imports of another.
 
 from __future__ import annotations
 
+import contextlib
 import os
 from pathlib import Path
 from typing import Annotated, Any
@@ -363,8 +364,9 @@ def report(
     from sandmould.execution.screen.ending import last_line
     from sandmould.report.page import write_report
     from sandmould.study.plan.build_plan import RESULTS
+    from sandmould.study.plan.load_study import open_study
     from sandmould.study.plan.ownership import check_owner
-    from sandmould.study.plan.plan_files import SPREADSHEET, SUMMARY
+    from sandmould.study.plan.plan_files import SPREADSHEET, SUMMARY, changed_line
 
     folder = RESULTS / study.stem
     check_owner(study, folder)
@@ -384,6 +386,9 @@ def report(
     except (ValueError, FileNotFoundError) as error:
         valid = f"a folder of results that can be read ({error})"
         raise BadInputError([Problem("results", str(folder), valid)]) from error
+    with contextlib.suppress(BadInputError):  # a study's file may be gone, its results are here
+        if said := changed_line(open_study(study).study, study, folder):
+            typer.echo(said)
     typer.echo(last_line(folder))
 
 

@@ -28,7 +28,7 @@ from sandmould.runs.progress import duration_text
 from sandmould.study.plan.announcement import stored_speeds
 from sandmould.study.plan.build_plan import Plan
 from sandmould.study.plan.lacking import WHOLE, Lack, Need
-from sandmould.study.plan.plan_files import read_run
+from sandmould.study.plan.plan_files import SUMMARY, changed_line, read_run
 from sandmould.study.rounds.round_log import read_rounds
 
 State = Literal["done", "failed", "running", "stopped", "waiting"]
@@ -144,7 +144,7 @@ def status_text(plan: Plan, results: Path, cores: int, deep: bool = False) -> st
     now_s = sum(status.cpu_s for status in statuses.values() if status.state == "running")
     spent_s = max(noted_s(folder) + now_s, sum(status.cpu_s for status in statuses.values()))
     jobs = [] if live is None else jobs_of(statuses)
-    left = _left(plan, statuses, cores, jobs)
+    left = _left(plan, statuses, lacks, cores, jobs)
     lines.append(f"processor time so far: {duration_text(spent_s)}; {left}")
     if live is not None:
         lines += [*driver_lines(plan.study.name), *queue_lines(jobs)]
@@ -165,6 +165,10 @@ def status_text(plan: Plan, results: Path, cores: int, deep: bool = False) -> st
     if deep:
         whole = [run for run in (*fills, *plan.runs) if run.run not in lacks]
         lines += _deep_lines(whole, folder)
+    if (folder / SUMMARY).exists() and (
+        said := changed_line(plan.study.study, plan.study.path, folder)
+    ):
+        lines.append(said)
     return "\n".join([*lines, *_orphans(plan, results)])
 
 
@@ -209,20 +213,30 @@ def _orphans(plan: Plan, results: Path) -> list[str]:
     return lines + ([f"  and {len(found) - LISTED_RUNS} more"] if len(found) > LISTED_RUNS else [])
 
 
-def _left(plan: Plan, statuses: Mapping[str, RunStatus], cores: int, jobs: Sequence[Job]) -> str:
+def _left(
+    plan: Plan,
+    statuses: Mapping[str, RunStatus],
+    lacks: Mapping[str, Lack],
+    cores: int,
+    jobs: Sequence[Job],
+) -> str:
     """Wall time until the report is written, on the cores of its jobs where there are any."""
     time_left = TimeLeft((*plan.fills, *plan.runs), stored_speeds(plan))
     for status in statuses.values():
         time_left.learn(status.run, status.wall_s)
     begun = {s.run: s.share for s in statuses.values() if s.state in ("running", "stopped")}
-    waiting = [s.run for s in statuses.values() if s.state == "waiting"]
+    waiting = [
+        s.run
+        for s in statuses.values()
+        if s.state == "waiting" and lacks[s.run].need is Need.COMPUTE
+    ]
     ahead = Outlook(cores)
     if any(job.lives for job in jobs):
         computes = any(status.state == "running" for status in statuses.values())
         ahead = outlook(jobs, computes, cores)
     left_s = time_left.seconds(begun, waiting, ahead.cores)
     if not left_s:
-        return "nothing left"
+        return "nothing left to compute" if lacks else "nothing left"
     left = [run for run in (*plan.fills, *plan.runs) if run.run in {*begun, *waiting}]
     where = f"{ahead.cores} cores {ahead.awaits}".strip()
     return (

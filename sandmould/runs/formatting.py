@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import json
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from numbers import Real
 from typing import Any, TypeGuard
 
@@ -85,6 +85,8 @@ _PREFIXED = ("Pa", "N/m")
 
 _LONGEST_LIST = 40
 """Letters of a list that is written out."""
+_MOST_PLACES = 6
+"""After the point, beyond which a small number is shown with an exponent."""
 _ONE_NUMBER = 1e-9
 """Numbers that differ by less, as a share, are one: round-off of a unit."""
 
@@ -167,8 +169,14 @@ def with_margin(mean: float, half_width: float) -> str:
     """A mean with its half width, both to the second digit of the half width."""
     if not math.isfinite(half_width) or half_width <= 0:
         return number(mean)
-    places = max(0, 1 - math.floor(math.log10(half_width)))
-    return f"{mean:.{places}f} ± {half_width:.{places}f}".replace("-", "−")
+    return " ± ".join(_as_exact((mean, half_width), half_width))
+
+
+def _as_exact(values: Iterable[float], width: float) -> list[str]:
+    """Numbers to the second digit of a width, with an exponent where that is very small."""
+    places = max(0, 1 - math.floor(math.log10(width))) if width > 0.0 else 3
+    shown = (number(x, 2) if places > _MOST_PLACES else f"{x:.{places}f}" for x in values)
+    return [text.replace("-", "−") for text in shown]
 
 
 def display_scale(key: str) -> tuple[float, str]:
@@ -188,10 +196,8 @@ def display_number(key: str, value: float, digits: int = 3) -> str:
 def display_range(key: str, low: float, high: float) -> str:
     """An interval of a measure with its unit as it is shown, to the second digit of its width."""
     factor, unit = (1e3, "mm") if unit_of(key) == "m" else (1.0, unit_of(key))
-    width = factor * (high - low)
-    places = max(0, 1 - math.floor(math.log10(width))) if width > 0.0 else 3
-    text = f"{factor * low:.{places}f} to {factor * high:.{places}f} {unit}"
-    return text.replace("-", "−").rstrip()
+    ends = _as_exact((factor * low, factor * high), factor * (high - low))
+    return f"{' to '.join(ends)} {unit}".rstrip()
 
 
 def value_text(key: str, value: Any) -> str:

@@ -8,12 +8,15 @@ from dataclasses import dataclass
 
 import numpy as np
 import pandas as pd
+import scipy
 from numpy.typing import NDArray
 
 from sandmould.statistics.mean_tests import MeanTest, compare_means
 
 Array = NDArray[np.float64]
 _ROUND_OFF = 1e-10
+_CALM = 0.001
+"""Chance of a spread so much smaller than that of all settings, below which it is another one."""
 
 
 class Contrasts:
@@ -121,7 +124,9 @@ class Spread:
         """Test the difference of two means, for all pairs of settings together (Tukey, Kramer).
 
         Where the two scatter more than all settings do, their own spread counts: the shared one
-        would then call chance a difference.
+        would then call chance a difference. So it does where they scatter so much less that chance
+        would seldom make it so, with their own degrees of freedom (Games and Howell 1976): one wild
+        setting would else hide what calm ones differ by.
 
         Returns
         -------
@@ -132,22 +137,28 @@ class Spread:
         difference, scale = contrasts.difference(self._place(first), self._place(second))
         if contrasts.df <= 0:
             return difference, None
-        error = max(contrasts.sd * scale, self._own_error(first, second, scale))
+        error, df = contrasts.sd * scale, float(contrasts.df)
+        if (own := self._own(first, second, scale)) is not None:
+            ratio = (own[0] / error) ** 2 if error > 0.0 else 1.0
+            if float(scipy.special.fdtr(own[1], df, ratio)) < _CALM:
+                error, df = own
+            error = max(error, own[0])
         largest = max(float(self.values[label].abs().max()) for label in (first, second))
         if not error > 1e-12 * largest:
             return difference, None
-        return difference, MeanTest(difference, error, contrasts.df, len(self.values))
+        return difference, MeanTest(difference, error, df, len(self.values))
 
     def _place(self, label: str) -> int:
         return list(self.values).index(label)
 
-    def _own_error(self, first: str, second: str, scale: float) -> float:
-        """Standard error by the spread of the two alone; zero where they have none."""
+    def _own(self, first: str, second: str, scale: float) -> tuple[float, float] | None:
+        """Standard error by the spread of the two alone, and its degrees of freedom."""
         x, y = self.values[first], self.values[second]
         if self.in_blocks:
             shared = x.index.intersection(y.index)
             x, y = x.loc[shared], y.loc[shared]
-        if (own := compare_means(x, y)) is None:
-            return 0.0
+        if (tested := compare_means(x, y)) is None:
+            return None
+        own = tested[0]
         # Pairs tell the standard deviation of a difference: that of a run times the root of two.
-        return own[0].error * math.sqrt(len(x) / 2.0) * scale if self.in_blocks else own[0].error
+        return own.error * (math.sqrt(len(x) / 2.0) * scale if self.in_blocks else 1.0), own.df

@@ -57,10 +57,10 @@ def compare_settings(
     """Compare the settings of a study by the mean of the objective.
 
     Only runs that are evidence of the objective count, see ``evidence``. Settings are compared
-    by the spread that all share, that of an analysis of variance, or by their own where it is
-    larger. Replicates share their seeds across settings: what a replicate shifts in all of them
-    drops out of their differences, see ``Spread.of``. Where settings have unlike replicates, these
-    differences also rank them. The best is picked after seeing the data:
+    by the spread that all share, that of an analysis of variance, or by their own, see
+    ``Spread.compare``. Replicates share their seeds across settings: what a replicate shifts in all
+    of them drops out of their differences, see ``Spread.of``. Where settings have unlike
+    replicates, these differences also rank them. The best is picked after seeing the data:
     intervals and p values hold for all pairs of settings together (Tukey 1953; Kramer 1956 for
     unlike numbers of replicates).
 

@@ -98,7 +98,8 @@ def left_line(plan: Plan, results: Path, cores: int) -> str:
     left = [run for run in runs if found.get(run.run, WHOLE).need is Need.COMPUTE]
     ended = len(plan.runs) - sum(run.part != FILL for run in left)
     if not left:
-        return f"All runs have ended here: {ended}.\n"
+        again = f"; {len(found)} are to be measured" if found else ""
+        return f"All runs have ended here: {ended}{again}.\n"
     prices = known_prices(plan, results)
     pieces = [prices.piece(run) for run in left]
     takes = f"the others take about {duration_text(study_s(pieces, cores))}"

@@ -112,11 +112,24 @@ def write_run(run: Run, folder: Path) -> Path:
 
 def write_study(study: Study, folder: Path) -> None:
     """Write the study as planned, with all that it rests on, for its report and the record."""
+    _write(folder / STUDY_FILE, _study_text(study))
+
+
+def changed_line(study: Study, path: Path, folder: Path) -> str:
+    """Say that a study's file has changed since its tables and report; empty where it has not.
+
+    ``path``: of the file; ``folder``: of its results.
+    """
+    known = folder / STUDY_FILE
+    if not known.is_file() or known.read_bytes() == _study_text(study).encode():
+        return ""
+    return f"{path.name} has changed since: sandmould run brings tables and report up to date"
+
+
+def _study_text(study: Study) -> str:
     tree = study.model_dump(mode="json")
     text = yaml.dump(tree, Dumper=_Dumper, sort_keys=False, allow_unicode=True, width=100)
-    _write(
-        folder / STUDY_FILE, f"# Written by the plan; change the study's own file instead.\n{text}"
-    )
+    return f"# Written by the plan; change the study's own file instead.\n{text}"
 
 
 def _write(path: Path, text: str) -> None:

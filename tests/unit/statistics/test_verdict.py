@@ -12,6 +12,7 @@ import pandas as pd
 import pytest
 from scipy import stats
 
+from sandmould.statistics.contrasts import Spread
 from sandmould.statistics.evidence import left_out_counts, one_way_runs
 from sandmould.statistics.mean_tests import compare_means
 from sandmould.statistics.verdict import compare_settings, further_replicates, rank_runs
@@ -275,6 +276,15 @@ def test_calm_settings_do_not_lend_their_calm_to_others() -> None:
                                FILL)  # fmt: skip
     assert not verdict.resolved
     assert [c.other for c in verdict.comparisons if not c.separated] == ["50 Hz"]
+
+
+def test_one_wild_setting_hides_no_difference_of_calm_ones() -> None:
+    fills = {"20": [0.30, 0.31, 0.29, 0.32], "30": [0.50, 0.52, 0.51, 0.50], "90": [9, -5, 6, -8]}
+    spread = Spread.of({label: pd.Series(values, dtype=float) for label, values in fills.items()})
+    _, test = spread.compare("30", "20")
+    assert test is not None
+    assert test.pvalue < 0.01
+    assert test.df < 4
 
 
 def test_three_replicates_of_six_settings_rule_some_out() -> None:

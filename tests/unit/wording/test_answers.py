@@ -8,7 +8,7 @@ from pathlib import Path
 import pytest
 
 from sandmould.kinds.sand.kind import SandStudy
-from sandmould.statistics.answer import Answer
+from sandmould.statistics.answer import Answer, Decided
 from sandmould.wording.answer import detail_sentences, first_sentence, limit_sentences
 from sandmould.wording.next_steps import NextStep, answer_steps
 from tests.answered import QUESTIONS
@@ -49,6 +49,16 @@ def test_full_is_said_where_it_was_asked_alone(name: str) -> None:
     assert "the pocket to 80 % of what fits" in said
     assert "95 %" not in said
     assert "full" not in said
+
+
+def test_runs_that_did_not_finish_are_told_at_once() -> None:
+    answer = replace(QUESTIONS["best_at_an_end"](), left_out={"did not finish": 5}, planned=14)
+    assert "5 of 14 runs did not finish." in first_sentence(answer)
+    answer = replace(answer, decided=Decided.OPEN)
+    first, *others = answer.verdict.settings
+    settings = (replace(first, n=1), *others)
+    open_one = replace(answer, verdict=replace(answer.verdict, settings=settings))
+    assert "By 1 to 3 runs each" in first_sentence(open_one)
 
 
 @pytest.mark.parametrize("name", QUESTIONS)
