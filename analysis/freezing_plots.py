@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 
 import numpy as np
 from matplotlib.axes import Axes
@@ -25,18 +25,18 @@ def draw_freezing(
     fields: Mapping[str, Array],
     freezing: Freezing,
     axes: Axes,
-    distance_m: DistanceM | None = None,
+    outlined: Sequence[DistanceM] = (),
 ) -> None:
     """Draw freezing times over the casting with hot spots and the last point to freeze.
 
-    ``distance_m``: from the surface of what is cast, whose outline is then drawn.
+    ``outlined``: distances from what is cast, whose outline is then drawn, and from its risers,
+    which are dashed.
     """
     cut, axis, at_m = _cut(fields, freezing)
     melts = cut["melts"].astype(bool)
     values = np.where(melts, cut["frozen_s"], np.nan)
     _draw(cut, axis, values, axes, "frozen at, s", "viridis")
-    if distance_m is not None:
-        _draw_outline(cut, axis, at_m, axes, distance_m)
+    _draw_outlines(cut, axis, at_m, axes, outlined)
     _frame_casting(cut, axes)
     spots_mm = 1e3 * _flat(freezing.hot_spots_m[:MOST_SPOTS], axis)
     axes.plot(*spots_mm.T, "o", mfc="none", mec=_INK, ms=9, mew=1.5, label="hot spot")
@@ -57,29 +57,40 @@ def draw_temperature(
     fields: Mapping[str, Array],
     freezing: Freezing,
     axes: Axes,
-    distance_m: DistanceM | None = None,
+    outlined: Sequence[DistanceM] = (),
 ) -> None:
     """Draw temperatures at the end over casting and mould, as ``draw_freezing``."""
     cut, axis, at_m = _cut(fields, freezing)
     celsius = cut["temperature_k"] - ZERO_K
     _draw(cut, axis, celsius, axes, "temperature at the end, °C", "inferno")
-    if distance_m is not None:
-        _draw_outline(cut, axis, at_m, axes, distance_m)
+    _draw_outlines(cut, axis, at_m, axes, outlined)
 
 
-def draw_niyama(fields: Mapping[str, Array], freezing: Freezing, axes: Axes) -> None:
+def draw_niyama(
+    fields: Mapping[str, Array],
+    freezing: Freezing,
+    axes: Axes,
+    outlined: Sequence[DistanceM] = (),
+) -> None:
     """Draw Niyama's value over the casting, as ``draw_freezing``; twice its limit is the most."""
-    cut, axis, _ = _cut(fields, freezing)
+    cut, axis, at_m = _cut(fields, freezing)
     niyama = 1e-3 * cut["niyama_sqrt_ks_m"]
     most = 2e-3 * NIYAMA_LOW
     _draw(cut, axis, niyama, axes, "Niyama, (K s)$^{1/2}$/mm", "RdYlBu", (0.0, most))
+    _draw_outlines(cut, axis, at_m, axes, outlined)
     _frame_casting(cut, axes)
 
 
-def draw_modulus(fields: Mapping[str, Array], freezing: Freezing, axes: Axes) -> None:
+def draw_modulus(
+    fields: Mapping[str, Array],
+    freezing: Freezing,
+    axes: Axes,
+    outlined: Sequence[DistanceM] = (),
+) -> None:
     """Draw the modulus over the casting, as ``draw_freezing``."""
-    cut, axis, _ = _cut(fields, freezing)
+    cut, axis, at_m = _cut(fields, freezing)
     _draw(cut, axis, 1e3 * cut["modulus_m"], axes, "modulus by freezing time, mm", "cividis")
+    _draw_outlines(cut, axis, at_m, axes, outlined)
     _frame_casting(cut, axes)
 
 
@@ -91,13 +102,15 @@ def _frame_casting(cut: Mapping[str, Array], axes: Axes) -> None:
     axes.set_ylim(low_mm[1], high_mm[1])
 
 
-def _draw_outline(
-    cut: Mapping[str, Array], axis: int, at_m: float, axes: Axes, distance_m: DistanceM
+def _draw_outlines(
+    cut: Mapping[str, Array], axis: int, at_m: float, axes: Axes, outlined: Sequence[DistanceM]
 ) -> None:
-    """The part as it is drawn, over the elements that stand for it."""
+    """The part as it is drawn, and its risers, over the elements that stand for it."""
     ends_m = cut["position_m"].min(axis=0), cut["position_m"].max(axis=0)
-    along_mm, outside_m = _section(*ends_m, axis, at_m, distance_m)
-    axes.contour(*along_mm, outside_m, [0.0], colors=_INK, linewidths=1)
+    for distance_m, style in zip(outlined, ("solid", "dashed"), strict=False):
+        along_mm, outside_m = _section(*ends_m, axis, at_m, distance_m)
+        if outside_m.min() < 0.0:  # the cut may miss the risers
+            axes.contour(*along_mm, outside_m, [0.0], colors=_INK, linewidths=1, linestyles=style)
 
 
 def draw_part(low_m: Array, high_m: Array, at_m: float, axes: Axes, distance_m: DistanceM) -> None:

@@ -282,9 +282,9 @@ def _scale_bar(ax: Axes, width: float, height: float) -> None:
             bbox={"facecolor": "white", "edgecolor": "none", "pad": 1.5, "alpha": 0.8})  # fmt: skip
 
 
-def png(figure: Figure) -> str:
-    """A figure as a PNG of few colours, a ``data:`` address."""
-    return picture_address(png_bytes(figure))
+def png(figure: Figure, has_scales: bool = False) -> str:
+    """A figure as a PNG of few colours, a ``data:`` address; with scales of colours it has all."""
+    return picture_address(png_bytes(figure, has_scales))
 
 
 def picture_address(content: bytes) -> str:
@@ -292,12 +292,14 @@ def picture_address(content: bytes) -> str:
     return _address("image/png", content)
 
 
-def png_bytes(figure: Figure) -> bytes:
-    """A figure as a PNG of few colours."""
+def png_bytes(figure: Figure, has_scales: bool = False) -> bytes:
+    """A figure as ``png``."""
     canvas = FigureCanvasAgg(figure)
     canvas.draw()
     drawn = Image.frombuffer("RGBA", canvas.get_width_height(), canvas.buffer_rgba())
-    picture = drawn.convert("RGB").quantize(_COLOURS, dither=Image.Dither.NONE)
+    picture = drawn.convert("RGB")
+    if not has_scales:
+        picture = picture.quantize(_COLOURS, dither=Image.Dither.NONE)
     small = io.BytesIO()
     picture.save(small, format="png", optimize=True)
     return small.getvalue()

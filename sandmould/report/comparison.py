@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 from pathlib import Path
 from typing import Any
@@ -31,6 +31,8 @@ from sandmould.statistics.verdict import FEW, compare_settings
 from sandmould.study.collect import Collected, read_collected, read_study
 from sandmould.study.plan.plan_files import SUMMARY, VERDICT_FILE
 
+BESIDE = ("part_solidification_time_s", "cut_off_fraction", "low_niyama_fraction")
+"""Measures that are shown beside the objective, where all studies have them."""
 _LEFT_OUT = ("title", "based_on", "sweep")
 _MOST_DIFFERENCES = 60
 _LONGEST = 60
@@ -94,6 +96,13 @@ class SideBySide:
         if is_one and all(is_number(v) for at in values.values() for v in at.values()):
             return sorted(values, key=lambda label: next(iter(values[label].values())))
         return list(values)
+
+    @property
+    def beside(self) -> list[SideBySide]:
+        """The same studies by the measures of ``BESIDE``."""
+        summaries = [each.collected.of_sweep.summary for each in self.studies]
+        known = [it for it in BESIDE if all(it in s and s[it].notna().any() for s in summaries)]
+        return [replace(self, measure=it) for it in known if it != self.measure]
 
     @property
     def key(self) -> str:
@@ -175,14 +184,18 @@ class SideBySide:
         )
 
     def text(self) -> str:
-        """The table of the objective and the verdicts for the terminal."""
+        """The tables of all that is compared and the verdicts for the terminal."""
+        tables = [it._means_text() for it in (self, *self.beside)]
+        said = [f"{each.name}: {each.verdict}" for each in self.studies]
+        return "\n".join([*tables, *said])
+
+    def _means_text(self) -> str:
         table = self.objective_table()
         rows = [[c.title for c in table.columns], *([c.text for c in row] for row in table.rows)]
         widths = [max(len(row[i]) for row in rows) for i in range(len(rows[0]))]
         lines = ["  ".join(t.ljust(w) for t, w in zip(row, widths, strict=True)).rstrip()
                  for row in rows]  # fmt: skip
-        said = [f"{each.name}: {each.verdict}" for each in self.studies]
-        return "\n".join([f"Mean {titled(self.measure)} ± 95 %", "", *lines, "", *said])
+        return "\n".join([f"Mean {titled(self.measure)} ± 95 %", "", *lines, ""])
 
 
 def _mean_cell(setting: Setting | None) -> Cell:
@@ -248,6 +261,7 @@ def write_comparison(comparison: SideBySide, out: Path) -> Path:
         measure_name=name_of(comparison.measure),
         sizes=(lay_out(chart, WIDE), lay_out(chart, NARROW)),
         objective=comparison.objective_table(),
+        beside={name_of(it.measure): it.objective_table() for it in comparison.beside},
         differences=comparison.differences(),
         few=FEW,
     )

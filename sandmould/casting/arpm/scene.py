@@ -122,13 +122,11 @@ def elements_of(scenario: Solidification) -> Elements:
 
 
 def risers_of(scenario: Solidification, elements: Elements) -> Flags:
-    """Which elements lie in risers and in no other part of the casting, (n,) bool."""
+    """Which elements lie in risers, (n,) bool: these have what they share with other parts."""
     found = np.zeros(len(elements.size_m), dtype=np.bool_)
-    # the casting's own parts come last and take what they share
-    for is_riser in (True, False):
-        for number, solid in enumerate(solids_of(scenario) if scenario.risers else ()):
-            if (number in scenario.risers) == is_riser:
-                found[inside_solid(solid, elements.position_m)] = is_riser
+    for number in scenario.risers:
+        solid = solid_of(scenario.shapes[number], f"shapes.{number}")
+        found |= inside_solid(solid, elements.position_m)
     return found
 
 
@@ -228,10 +226,17 @@ def _places(scenario: Solidification) -> Iterator[Problem]:
         except BadInputError as error:
             yield from error.problems
             continue
+        # meshes in files have fewer digits than the box
+        near_m = 1e-6 * (high_m - low_m)
         if corners.shape[1] != scenario.dimensions:
             valid = f"a shape of {scenario.dimensions}D as the box is"
+            if isinstance(shape, SolidMesh):
+                valid += (
+                    ", or a box with three coordinates; where it ends at both sides of a plate no "
+                    "heat passes, so the plate freezes as in 2D"
+                )
             yield Problem(f"{key}.kind", shape.kind, valid)
-        elif (corners < low_m).any() or (corners > high_m).any():
+        elif (corners < low_m - near_m).any() or (corners > high_m + near_m).any():
             reach = [corners.min(axis=0).tolist(), corners.max(axis=0).tolist()]
             hint = ""
             if isinstance(shape, SolidMesh):
@@ -245,7 +250,11 @@ def _places(scenario: Solidification) -> Iterator[Problem]:
 
 def _layout_problems(scenario: Solidification) -> Iterator[Problem]:
     try:
-        check_casting(elements_of(scenario), filling_of(scenario))
+        elements = elements_of(scenario)
+        check_casting(elements, filling_of(scenario))
+        if scenario.risers and risers_of(scenario, elements)[elements.material == CASTING].all():
+            valid = "shapes that leave some of the casting for them to feed"
+            yield Problem("risers", list(scenario.risers), valid)
         yield from _ratio(scenario)
     except ValueError as error:
         kinds = [shape.kind for shape in scenario.shapes]

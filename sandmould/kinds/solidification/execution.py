@@ -39,6 +39,8 @@ class SolidificationExecution(CastingExecution[Solidification]):
                 table[f"last_point_{axis}_m"] = place_m
             table["hot_spots"] = len(frozen.hot_spots_m)
             if fed := feeding(fields):
+                own = fields["melts"] & ~fields["riser"]
+                table["part_solidification_time_s"] = fields["frozen_s"][own].max()
                 table["cut_off_fraction"] = fed.cut_off_fraction
                 table["low_niyama_fraction"] = fed.low_fraction
         write_measures(folder, table)

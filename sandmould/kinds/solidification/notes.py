@@ -25,6 +25,8 @@ FEWEST_ELEMENTS = 2
 """Through a wall: with fewer its inside and its surface are one."""
 VOLUME_OFF = 0.01
 """Of the drawn volume, told when elements hold so much more or less."""
+MOVED = 0.25
+"""Of an element, told when the casting's elements end farther from its drawing."""
 LATER = 1.05
 """Times the time in sand without end from which a box is called small."""
 
@@ -44,6 +46,8 @@ def notes(scenario: Solidification) -> tuple[Note, ...]:
         times_s=_times_s(scenario, it) if share < 1.0 else None,
         sides=_sides(scenario),
         box_m=_box_m(scenario),
+        moved=_moved(scenario),
+        as_drawn=scenario.exchange not in scene.KERNEL_FORMS,
         fewest=FEWEST_ELEMENTS,
         wall=_thin_wall(scenario.shapes, FEWEST_ELEMENTS * scenario.element_m * (1.0 - 1e-6)),
         drawn=drawn,
@@ -84,6 +88,19 @@ def _box_m(scenario: Solidification) -> list[float] | None:
     layers = [sum(side.endswith(axis) for side in sides) for axis in "xyz"[: len(given_m)]]
     box_m = elements.high_m - elements.low_m - scenario.element_m * np.array(layers)
     return None if np.allclose(box_m, given_m, rtol=1e-9) else box_m.tolist()
+
+
+def _moved(scenario: Solidification) -> dict[str, tuple[Any, Any]]:
+    """Ends (m) of the casting's elements and of its drawing, by axis, where they lie apart."""
+    raster = scene.raster_of(scenario)
+    corners = np.concatenate([solid.corners() for solid in scene.solids_of(scenario)])
+    cells = np.argwhere(raster.material == scene.CASTING)
+    held = raster.low_m + raster.cell_m * np.array([cells.min(axis=0), cells.max(axis=0) + 1])
+    drawn = np.array([corners.min(axis=0), corners.max(axis=0)])
+    off = (np.abs(held - drawn) / raster.cell_m).max(axis=0)
+    apart = (off > MOVED + 1e-6) & (off < 0.5 + 1e-6)  # beyond, a tip or a thin wall is missing
+    ends = np.stack([held, drawn]).round(9) + 0.0
+    return {"xyz"[k]: (ends[0, :, k], ends[1, :, k]) for k in np.flatnonzero(apart)}
 
 
 @lru_cache(maxsize=8)

@@ -48,7 +48,7 @@ from sandmould.statistics.refining import resolution_among
 from sandmould.statistics.verdict import rank_runs
 from sandmould.study.collect import Collected
 from sandmould.wording.answer import AnswerWords
-from sandmould.wording.next_steps import NextStep
+from sandmould.wording.next_steps import NextStep, step
 
 NEAR_PERCENT = 5.0
 """Off the reference's solidification time: as near as the answer takes for good."""
@@ -57,6 +57,8 @@ _ROOMY = ConstrainedLayoutEngine(w_pad=0.12, h_pad=0.1)
 MOST_POINTS = 600
 """Of a cooling curve."""
 MOST_BOXES = 5
+ALIKE = 0.01
+"""Of the time of a casting: hot spots that freeze so near its end are told beside the last."""
 LAST_SHARE = 0.98
 """Of the casting's time, from which on what flows is shown as the last."""
 
@@ -91,7 +93,7 @@ def _pages(findings: Findings[Solidification], film_budget_bytes: int) -> KindPa
     folder = findings.study_folder / "runs" / run
     cooling = _cooling(run, collected.curves, scenario)
     curves = measure_curves(collected, verdict, ["solidified_fraction"])
-    fields, first, said, tables, fed = _fields(folder, scenario)
+    fields, first, said, tables, fed, fed_by = _fields(folder, scenario)
     errors = _errors(reference, scenario, collected) if reference else []
     error_cost = _error_charts(errors)
     cheapest = "" if study.seeks_best else _cheapest(errors, reference, collected)
@@ -128,7 +130,7 @@ def _pages(findings: Findings[Solidification], film_budget_bytes: int) -> KindPa
             has_stand_ins=bool(stand_ins),
             dimensions=scenario.dimensions,
         ),
-        steps=() if resolution_among(keys) and not reference else _steps(scenario, bool(reference)),
+        steps=_steps(scenario, keys, bool(reference), fed_by),
     )
 
 
@@ -138,13 +140,23 @@ def _of_one(findings: Findings[Solidification], said: Sequence[str]) -> str:
     return worded("cast_answer.j2", it=AnswerWords(findings.answer), said=texts)
 
 
-def _steps(scenario: Solidification, has_reference: bool) -> tuple[NextStep, ...]:
-    """Finer elements, where no reference tells how good these are."""
+def _steps(
+    scenario: Solidification,
+    keys: Sequence[str],
+    has_reference: bool,
+    riser: tuple[NextStep, ...],
+) -> tuple[NextStep, ...]:
+    """A riser where there is none; finer elements, where no reference tells how good these are."""
     if has_reference:
         text = "Take these elements for a casting of this kind, and check them once by finer ones."
         return (NextStep(text),)
+    if resolution_among(keys):
+        return riser
     finer = f"scenario: {{element_m: {scenario.element_m / 2:g}}}"
-    return (NextStep("See whether the result stays with elements half as large:", finer),)
+    return (
+        *riser,
+        NextStep("See whether the result stays with elements half as large:", finer),
+    )
 
 
 def _run_of(summary: pd.DataFrame, answer: Answer) -> str:
@@ -187,38 +199,52 @@ def _of_point(summary: pd.DataFrame, reference: Point) -> pd.DataFrame:
 
 def _fields(
     folder: Path, scenario: Solidification
-) -> tuple[str, FirstPicture | None, tuple[str, ...], tuple[Table, ...], Feeding | None]:
-    """Pictures of a run's fields, what they say in words, its hot spots and what is cut off."""
+) -> tuple[
+    str,
+    FirstPicture | None,
+    tuple[str, ...],
+    tuple[Table, ...],
+    Feeding | None,
+    tuple[NextStep, ...],
+]:
+    """Pictures of a run's fields, what they say in words and tables, and the riser to add."""
     if not (folder / "fields.npz").is_file():
-        return "", None, ("No run has left fields.",), (), None
+        return "", None, ("No run has left fields.",), (), None, ()
     with np.load(folder / "fields.npz", allow_pickle=False) as file:
         fields = dict(file)
     melts = fields["melts"]
     place_m = fields["position_m"][melts]
     frozen = freezing(place_m, fields["frozen_s"][melts], scenario.hot_spot_reach_m)
     fed = feeding(fields)
-    distance_m = distance_from(solids_of(scenario))
+    solids = solids_of(scenario)
+    risers = [solids[number] for number in scenario.risers]
+    outlined = [distance_from(some) for some in (solids, risers) if some]
     reads = fed is not None and math.isfinite(fed.low_fraction)
     figure = Figure(figsize=(11, 9.2), dpi=110, layout=_ROOMY)
     (first_axes, end), (third, fourth) = figure.subplots(2, 2)
-    draw_freezing(fields, frozen, first_axes, distance_m)
-    draw_temperature(fields, frozen, end, distance_m)
+    draw_freezing(fields, frozen, first_axes, outlined)
+    draw_temperature(fields, frozen, end, outlined)
     has_modulus = fed is not None and bool(np.isfinite(fields["modulus_m"]).any())
     for axes, draw, is_known in ((third, draw_modulus, has_modulus), (fourth, draw_niyama, reads)):
         if is_known:
-            draw(fields, frozen, axes)
+            draw(fields, frozen, axes, outlined)
         else:
             axes.set_axis_off()
     alone = Figure(figsize=(5.6, 4.6), dpi=110, layout=_ROOMY)
-    draw_freezing(fields, frozen, alone.subplots(), distance_m)
+    draw_freezing(fields, frozen, alone.subplots(), outlined)
     alt = f"When each part of the casting froze in run {folder.name}, with its outline"
-    caption = "When each part of the casting froze, and the part as drawn (line)"
+    dashed = "; dashed: risers" if risers else ""
+    caption = f"When each part of the casting froze, and the part as drawn (line{dashed})"
     where = ", cut through the last point to freeze" if scenario.dimensions == 3 else ""
-    first = FirstPicture(png(alone), alt, f"{caption}{where}.")
+    first = FirstPicture(png(alone, has_scales=True), alt, f"{caption}{where}.")
+    part = _of_part(fields, scenario)
+    spot_s = (part or frozen).hot_spot_s
     said = sentences(
         "frozen.j2",
         it=frozen,
-        part=_of_part(fields, scenario),
+        part=part,
+        others=int((spot_s[1:] >= (1.0 - ALIKE) * spot_s[0]).sum()),
+        alike=ALIKE,
         fed=fed,
         is_solid=math.isfinite(frozen.solidification_time_s),
         has_risers=bool(scenario.risers),
@@ -227,7 +253,11 @@ def _fields(
         flat=scenario.dimensions == 2,
     )
     tables = (_spots(frozen), *([_cut_off(fed, scenario.dimensions)] if fed else []))
-    return png(figure), first, said, tables, fed
+    riser: tuple[NextStep, ...] = ()
+    if not risers and has_modulus and math.isfinite(frozen.solidification_time_s):
+        modulus_mm = 1e3 * float(np.nanmax(fields["modulus_m"]))  # the last to freeze has the most
+        riser = (step("riser", it=frozen, modulus_mm=modulus_mm),)
+    return png(figure, has_scales=True), first, said, tables, fed, riser
 
 
 def _of_part(fields: Mapping[str, Any], scenario: Solidification) -> Freezing | None:

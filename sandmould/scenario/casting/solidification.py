@@ -205,7 +205,8 @@ class Solidification(MetalAndMould):
     )
     risers: tuple[Annotated[int, Field(ge=0)], ...] = quantity(
         (),
-        "Which of the shapes are risers, counted from 0: they feed the others.",
+        "Which of the shapes are risers, counted from 0: they feed the others, and what they share "
+        "with these counts as riser.",
         source="user",
     )
     inserts: tuple[Insert, ...] = Field(

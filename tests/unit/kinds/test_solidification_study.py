@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import base64
+import io
 import math
 from collections.abc import Callable, Mapping
 from pathlib import Path
@@ -12,19 +14,27 @@ import numpy as np
 import pandas as pd
 import pytest
 import yaml
+from matplotlib.figure import Figure
 from PIL import Image
 
 from sandmould import ROOT
 from sandmould.analysis.freezing import freezing
+from sandmould.analysis.freezing_plots import (
+    draw_freezing,
+    draw_modulus,
+    draw_niyama,
+    draw_temperature,
+)
 from sandmould.bad_input import BadInputError
 from sandmould.casting.arpm import computation
 from sandmould.execution.simulate import export_run, measure_run, render_run, simulate
-from sandmould.report.kinds.solidification import _fields
+from sandmould.report.kinds.solidification import _fields, distance_from
 from sandmould.report.page import _stand_ins, write_report
 from sandmould.runs import checkpoint_file
 from sandmould.runs.checkpoint_file import CheckpointFile
 from sandmould.runs.formatting import number
 from sandmould.runs.outcome import Outcome, RunOutcome
+from sandmould.scenario.casting.shapes import Rectangle
 from sandmould.scenario.casting.solidification import MetalAndMould, Solidification
 from sandmould.study.collect import collect
 from sandmould.study.plan.expand import expand
@@ -33,6 +43,7 @@ from sandmould.study.plan.plan_files import plan_table, read_run, write_run, wri
 from sandmould.study.plan.price import Prices
 from sandmould.wording.answer import AnswerWords
 from tests.planned import write_plan
+from tests.unit.geometry.test_mesh_union import box, file_of
 
 SMALL: dict[str, Any] = {
     "box": {"low_m": [0.0, 0.0], "high_m": [0.08, 0.08]},
@@ -102,6 +113,7 @@ BAR = SMALL["shapes"][0]
             r"scenario.probes.0.at_m = \[0.1, 0.0\] .* a point in the box",
         ),
         ({"risers": [1]}, r"risers.0 = 1 .* at most 0, a shape"),
+        ({"risers": [0]}, r"risers = \[0\] .* that leave some of the casting for them to feed"),
         ({"read_at_solid_fraction": 1.0}, "read_at_solid_fraction = 1.0 .* less than 1"),
         ({"probes": [*SMALL["probes"]] * 2}, "scenario.probes.1.name = 'middle' .* each name once"),
         ({"initial_k": {"casting": 1500.0}}, r"initial_k.casting = 1500.0 .* cast steel, 1713 K"),
@@ -254,6 +266,66 @@ def test_a_short_riser_leaves_a_plate_without_feed(tmp_path: Path) -> None:
     assert text.endswith(ending)
 
 
+def test_what_a_riser_shares_with_the_part_is_riser(tmp_path: Path) -> None:
+    plate = {"kind": "rectangle", "low_m": [0.01, 0.02], "high_m": [0.07, 0.03]}
+    boss = {"kind": "rectangle", "low_m": [0.03, 0.03], "high_m": [0.05, 0.045]}
+    riser = boss | {"high_m": [0.05, 0.05]}
+    found = []
+    for shapes in ([plate, boss, riser], [riser, plate, boss], [plate, riser]):
+        risers = [shapes.index(riser)]
+        folder = measured(tmp_path, shapes=shapes, risers=risers, element_m=0.0025, record_s=1.0)
+        found.append(np.load(folder / "fields.npz"))
+        last = pd.read_csv(folder / "measures.tsv", sep="\t").iloc[-1]
+        # the boss freezes last of all, and lies in the riser
+        assert 0.03 < last["last_point_y_m"] < 0.045
+        own = found[-1]["melts"] & ~found[-1]["riser"]
+        part_s = found[-1]["frozen_s"][own].max()
+        assert last["part_solidification_time_s"] == pytest.approx(part_s)
+        assert part_s < last["solidification_time_s"]
+        assert found[-1]["volume_m3"][own].sum() == pytest.approx(600e-6)
+        said = _fields(folder, read_run(folder / "scenario.yaml").scenario)[2]
+        assert "; the risers are after" in said[0]
+        assert said[1].startswith("Feeding: the risers feed all of the casting")
+    for name in found[0].files:
+        np.testing.assert_array_equal(found[0][name], found[1][name])
+        np.testing.assert_array_equal(found[0][name], found[2][name])
+
+
+def test_pictures_outline_risers_and_have_all_colours(tmp_path: Path) -> None:
+    riser = BAR | {"low_m": [0.03, 0.05], "high_m": [0.05, 0.07]}
+    folder = one_run(tmp_path, shapes=[BAR, riser], risers=[1])
+    picture = _fields(folder, read_run(folder / "scenario.yaml").scenario)[0].partition(",")[2]
+    with Image.open(io.BytesIO(base64.b64decode(picture))) as image:
+        assert len(image.convert("RGB").getcolors(1 << 20) or ()) > 512
+    fields = dict(np.load(folder / "fields.npz"))
+    frozen = freezing(*(fields[name][fields["melts"]] for name in ("position_m", "frozen_s")), 0.02)
+    bodies = [[Rectangle.model_validate(shape).solid] for shape in (BAR, riser)]
+    for draw in (draw_freezing, draw_temperature, draw_modulus, draw_niyama):
+        axes = Figure().subplots()
+        draw(fields, frozen, axes, [distance_from(body) for body in bodies])
+        dashes = [lines.get_linestyle()[0][1] for lines in axes.collections]
+        assert [pattern is None for pattern in dashes] == [True, False]
+
+
+def test_a_place_that_freezes_with_the_last_is_counted(tmp_path: Path) -> None:
+    bars = [BAR | {"low_m": [x, 0.03], "high_m": [x + 0.02, 0.05]} for x in (0.01, 0.05)]
+    for shapes, beside in (
+        (bars, " and, within 1 % of that time, at 1 other hot spot."),
+        ([BAR], "."),
+    ):
+        folder = measured(tmp_path, shapes=shapes)
+        _, _, said, _, _, (riser,) = _fields(folder, read_run(folder / "scenario.yaml").scenario)
+        place = said[0].partition(", last at ")[2]
+        assert place.endswith(f" mm{beside}")
+        # nothing is named as a riser
+        modulus_m = np.nanmax(np.load(folder / "fields.npz")["modulus_m"])
+        at = place.removesuffix(beside)
+        assert riser.text == (
+            f"Name a riser (risers) that feeds {at}, where the casting freezes last. Its modulus "
+            f"must be larger than that of the casting there, {number(1e3 * modulus_m)} mm."
+        )
+
+
 def test_a_number_without_a_section_is_named_among_placeholders(tmp_path: Path) -> None:
     (run,) = expand(open_study(ROOT / "config" / "studies" / "riser.yaml"))
     write_plan([run], tmp_path)
@@ -361,6 +433,22 @@ def test_a_mesh_is_cast_in_3d_with_a_block_beside_it(tmp_path: Path) -> None:
     assert (folder / "final.png").stat().st_size > 10_000
 
 
+def test_a_flat_mesh_freezes_as_in_2d_in_a_box_that_ends_at_it(tmp_path: Path) -> None:
+    # 0.05 m as the file has it is larger by a part in 1e8
+    plate = box([0.03, 0.02, -0.05], [0.05, 0.06, 0.05])
+    mesh = {"kind": "mesh", "file": file_of([plate], tmp_path).name, "unit_m": 1.0}
+    room = {"low_m": [0.0, 0.0, -0.05], "high_m": [0.08, 0.08, 0.05]}
+    runs = [
+        measured(tmp_path, **changed)
+        for changed in ({}, {"shapes": [mesh], "box": room, "probes": []})
+    ]
+    flat_s, plate_s = (
+        pd.read_csv(run / "measures.tsv", sep="\t")["solidification_time_s"].iloc[-1]
+        for run in runs
+    )
+    assert plate_s == pytest.approx(flat_s, rel=1e-6)
+
+
 def test_touching_parts_are_one_casting(tmp_path: Path) -> None:
     low, high = (
         BAR | {"high_m": [0.05, 0.04]},
@@ -419,7 +507,10 @@ def test_a_bar_that_is_turned_freezes_as_it_did_upright(tmp_path: Path, way: str
         ({"kind": "image", "file": "none.png", "pixel_m": 0.005}, "a readable file"),
         ({"kind": "image", "file": "trial.yaml", "pixel_m": 0.005}, "a picture, such as a PNG"),
         ({"kind": "image", "file": "white.png", "pixel_m": 0.005}, "with dark pixels for"),
-        ({"kind": "mesh", "file": "corner.stl", "unit_m": 0.001}, "a shape of 2D as the box is"),
+        (
+            {"kind": "mesh", "file": "corner.stl", "unit_m": 0.001},
+            "a shape of 2D as the box is, or a box with three coordinates; where it ends at both",
+        ),
     ],
 )
 def test_files_that_hold_no_casting_are_told(

@@ -57,8 +57,13 @@ def test_studies_of_one_key_stand_over_it(finished: Path, monkeypatch: pytest.Mo
     assert re.match("40 mm +– +0", lines[5])
     assert out.rstrip().endswith("page.html\npage.svg")
     assert "faces: faces says so." in lines
+    # what a foundry compares beside the objective
+    means = [line for line in lines if line.startswith("Mean ")]
+    assert means[0] == "Mean solidified fraction ± 95 %"
+    assert "Mean share of the part that is cut off from the risers ± 95 %" in means
     page = Path("page.html").read_text()
     assert "scenario.exchange" in page
+    assert "<h3>Share of the part below Niyama&#39;s limit</h3>" in page
     assert "scenario.element_m" not in page  # it is swept
     assert not re.search("https?:", page.replace("http://www.w3.org", ""))
     assert Path("page.svg").read_text().count("<circle") == 5

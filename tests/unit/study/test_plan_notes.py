@@ -138,6 +138,17 @@ def test_elements_that_hold_another_volume_than_drawn_are_told(tmp_path: Path) -
     assert it.volume_m3 + it.sand_m3 == pytest.approx(0.124**2, rel=1e-9)
 
 
+def test_elements_beside_the_drawn_faces_are_told(tmp_path: Path) -> None:
+    off = around(0.04, 0.05)
+    off["box"]["low_m"] = [-0.002, 0.0]
+    assert notes_of(tmp_path, **off, element_m=0.005)[-1] == (
+        "Elements: they hold the casting at x 48 to 88 instead of 50 to 90 mm, since they do not "
+        "meet its faces. Heat, volume and surface are as drawn; pictures and places of the report "
+        "are those of elements. Both are alike where the box begins a whole number of elements "
+        "before the casting and elements divide its size."
+    )
+
+
 def test_too_little_sand_is_told(tmp_path: Path) -> None:
     (little,) = notes_of(tmp_path, **around(0.04, 0.01), element_m=0.002)
     # 40 mm squared gives 0.79 of what 60 mm squared less it can take, 2 000 mm2 over 160 mm
