@@ -29,18 +29,19 @@ from sandmould.bad_input import BadInputError
 from sandmould.casting.arpm import computation
 from sandmould.execution.simulate import export_run, measure_run, render_run, simulate
 from sandmould.report.kinds.solidification import _fields, distance_from
-from sandmould.report.page import _stand_ins, write_report
+from sandmould.report.page import write_report
 from sandmould.runs import checkpoint_file
 from sandmould.runs.checkpoint_file import CheckpointFile
 from sandmould.runs.formatting import number
 from sandmould.runs.outcome import Outcome, RunOutcome
 from sandmould.scenario.casting.shapes import Rectangle
-from sandmould.scenario.casting.solidification import MetalAndMould, Solidification
+from sandmould.scenario.casting.solidification import Solidification
 from sandmould.study.collect import collect
 from sandmould.study.plan.expand import expand
 from sandmould.study.plan.load_study import open_study
-from sandmould.study.plan.plan_files import plan_table, read_run, write_run, write_study
+from sandmould.study.plan.plan_files import plan_table, read_run, write_study
 from sandmould.study.plan.price import Prices
+from sandmould.study.plan.stand_ins import stand_in_line, stand_ins
 from sandmould.wording.answer import AnswerWords
 from tests.planned import write_plan
 from tests.unit.geometry.test_mesh_union import box, file_of
@@ -326,16 +327,15 @@ def test_a_place_that_freezes_with_the_last_is_counted(tmp_path: Path) -> None:
         )
 
 
-def test_a_number_without_a_section_is_named_among_placeholders(tmp_path: Path) -> None:
+def test_a_number_without_a_section_is_named_among_placeholders() -> None:
     (run,) = expand(open_study(ROOT / "config" / "studies" / "riser.yaml"))
-    write_plan([run], tmp_path)
-    write_run(run, tmp_path)
-    found = _stand_ins(tmp_path, [run.run], MetalAndMould)
+    found = stand_ins(run)
     assert found == ("initial_k.casting", "initial_k.mould", "heat_transfer_w_m2_k")
     assert [AnswerWords._section(key) for key in found][1:] == [
         "initial temperatures",
         "heat transfer",
     ]
+    assert "to be replaced by those of your own material: initial_k.casting, " in stand_in_line(run)
 
 
 def test_a_run_that_ends_liquid_says_so(tmp_path: Path) -> None:
