@@ -105,6 +105,11 @@ class SideBySide:
         return [replace(self, measure=it) for it in known if it != self.measure]
 
     @property
+    def has_common_settings(self) -> bool:
+        """Whether some setting was computed in two of them."""
+        return len(self.labels) < sum(map(len, self._settings))
+
+    @property
     def key(self) -> str:
         """The one key with numbers that all of them sweep; empty where there is none."""
         swept = {each.keys for each in self.studies}
@@ -263,6 +268,7 @@ def write_comparison(comparison: SideBySide, out: Path) -> Path:
         objective=comparison.objective_table(),
         beside={name_of(it.measure): it.objective_table() for it in comparison.beside},
         differences=comparison.differences(),
+        common=comparison.has_common_settings,
         few=FEW,
     )
     write_text(out, page)

@@ -36,6 +36,8 @@ def notes(scenario: Scenario) -> tuple[Note, ...]:
     }
     return templates.notes(
         "plan_sand.j2",
+        grains_m=[each.diameter_m for each in scenario.sand.classes(scenario.dimension)],
+        scale=scenario.sand.size_scale,
         hardness=bed_hardness(scenario),
         least=LEAST_KAPPA,
         narrow=narrow_spaces(scenario),

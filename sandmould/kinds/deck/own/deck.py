@@ -60,7 +60,7 @@ def _commands(deck: str) -> str:
 def problems(scenario: OwnDeck) -> list[Problem]:
     """List what keeps a template from being rendered with its values."""
     faults = [
-        Problem("template" if n == scenario.template else "files", n, "a file that can be read")
+        Problem("template" if n == scenario.template else "files", n, "a file that is there")
         for n, path in scenario.paths.items()
         if not path.is_file()
     ]
