@@ -14,7 +14,7 @@ from benchmarks.frame import render
 from benchmarks.frequency_law import chart, groups, groups_chart
 from benchmarks.frequency_law.controls import RecordedCurves
 from benchmarks.frequency_law.fill_map import map_text
-from benchmarks.frequency_law.screening import PROPERTIES, STUDY, screen, told
+from benchmarks.frequency_law.screening import PROPERTIES, screen, told
 from benchmarks.frequency_law.series import FREQUENCY, series_of
 from sandmould import ROOT
 from sandmould.execution.records import RECORDS
@@ -101,7 +101,7 @@ def evidence(records: Path = RECORDS) -> str:
         "law": law,
         "dimensionless": groups.DIMENSIONLESS,
         "other_lengths": _other_lengths(law["settings"], records) if law else [],
-        "screen": screen(records / STUDY) if (records / STUDY / "record.json").is_file() else None,
+        "screen": screen(records),
         "properties": list(PROPERTIES.values()),
         "told": told,
         "regrets": groups.regrets(groups.thrown(_of_the_tube(records)), (groups.LAW, groups.MAP)),

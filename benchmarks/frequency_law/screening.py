@@ -24,7 +24,8 @@ from sandmould.study.plan.expand import expand
 from sandmould.study.plan.load_study import open_study
 
 Array = NDArray[np.float64]
-STUDY = "tube_law_screen"
+STUDIES = ("tube_law_screen", "tube_law_screen_more")
+"""One design each, with fillings of its own."""
 PROPERTIES = {
     "contact.grain_grain.damping_ratio": "damping ratio of grains, 1 to 0.3",
     "background_damping.form": "background damping, by components to none",
@@ -49,12 +50,21 @@ class Effects:
     scenes: int
 
 
-def screen(folder: Path) -> dict[str, Effects]:
+def screen(records: Path) -> dict[str, Effects] | None:
     """Effects on the top less the low end, less the high end, and on log2 of the top's place."""
-    study = open_study(ROOT / json.loads((folder / "record.json").read_text())["study"])
+    folders = [records / name for name in STUDIES if (records / name / "record.json").is_file()]
+    if not folders:
+        return None
+    study = open_study(ROOT / json.loads((folders[0] / "record.json").read_text())["study"])
     hardness = bed_hardness(expand(study)[0].scenario)
     assert hardness is not None
-    return effects_of(read_summary(folder), hardness.column_hz)
+    return effects_of(pd.concat(map(_fillings, folders)), hardness.column_hz)
+
+
+def _fillings(folder: Path) -> pd.DataFrame:
+    """Runs of a record, their replicates told from those of others."""
+    summary = read_summary(folder)
+    return summary.assign(replicate=folder.name + summary["replicate"].astype(str))
 
 
 def effects_of(summary: pd.DataFrame, column_hz: float) -> dict[str, Effects]:

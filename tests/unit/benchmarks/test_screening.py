@@ -8,7 +8,7 @@ import numpy as np
 import pandas as pd
 import pytest
 
-from benchmarks.frequency_law.screening import PROPERTIES, STUDY, effects_of, told
+from benchmarks.frequency_law.screening import PROPERTIES, STUDIES, effects_of, told
 from benchmarks.frequency_law.series import FREQUENCY, MEASURE
 from sandmould import ROOT
 from sandmould.definition.sweep import Point
@@ -61,8 +61,9 @@ def test_the_top_of_chance_alone_is_not_above_the_ends() -> None:
     assert abs(found["high"].mean) < 0.02
 
 
-def test_the_shipped_study_is_that_design() -> None:
-    runs = expand(open_study(ROOT / "config" / "studies" / f"{STUDY}.yaml"))
+@pytest.mark.parametrize("study", STUDIES)
+def test_the_shipped_study_is_that_design(study: str) -> None:
+    runs = expand(open_study(ROOT / "config" / "studies" / f"{study}.yaml"))
     first = runs[0].parameters
     found = {tuple(int(run.parameters[p] != first[p]) for p in PROPERTIES) for run in runs}
     assert found == set(levels())

@@ -87,7 +87,11 @@ def test_replicates_need_a_seed_in_the_template(tmp_path: Path) -> None:
 @pytest.mark.parametrize(
     ("template", "scenario", "told"),
     [
-        (TEMPLATE, {"template": "other.in.j2"}, r"scenario.template = 'other.in.j2' .* that is there"),
+        (
+            TEMPLATE,
+            {"template": "other.in.j2"},
+            r"scenario.template = 'other.in.j2' .* is there",
+        ),
         (TEMPLATE, {"files": ["grains.data"]}, r"scenario.files = 'grains.data' .* that is there"),
         (TEMPLATE + "{{ friction }}", {}, r"'friction' is undefined\); it is given angle_deg, n"),
         ("{% if %}", {}, r"template that renders \(line 1: "),
