@@ -179,7 +179,7 @@ def _as_exact(values: Iterable[float], width: float) -> list[str]:
     """Numbers to the second digit of a width, with an exponent where that is very small."""
     places = max(0, 1 - math.floor(math.log10(width))) if width > 0.0 else 3
     shown = (number(x, 2) if places > _MOST_PLACES else f"{x:.{places}f}" for x in values)
-    return [text.replace("-", "−") for text in shown]
+    return [text.lstrip("-") if not text.strip("-0.") else text.replace("-", "−") for text in shown]
 
 
 def display_scale(key: str) -> tuple[float, str]:

@@ -8,15 +8,14 @@ from dataclasses import dataclass
 
 import numpy as np
 import pandas as pd
-import scipy
 from numpy.typing import NDArray
 
-from sandmould.statistics.mean_tests import MeanTest, compare_means
+from sandmould.statistics.mean_tests import MeanTest, alike_pvalue, compare_means
 
 Array = NDArray[np.float64]
 _ROUND_OFF = 1e-10
-_CALM = 0.001
-"""Chance of a spread so much smaller than that of all settings, below which it is another one."""
+_UNLIKE = 0.001
+"""Chance of spreads so unlike, below which settings do not share one."""
 
 
 class Contrasts:
@@ -94,6 +93,8 @@ class Spread:
     contrasts: Contrasts
     in_blocks: bool
     """Whether blocks count in the differences."""
+    are_unlike: bool
+    """Whether settings scatter so unlike each other that they share no spread."""
 
     @staticmethod
     def of(values: Mapping[str, pd.Series[float]]) -> Spread:
@@ -108,13 +109,14 @@ class Spread:
         run_value = np.concatenate([v.to_numpy(dtype=np.float64) for v in used.values()])
         setting = np.repeat(np.arange(len(used)), [len(v) for v in used.values()])
         apart = Contrasts(setting, np.zeros_like(setting), run_value)
+        unlike = alike_pvalue([run_value[setting == n] for n in range(len(used))]) < _UNLIKE
         block = pd.factorize(np.concatenate([v.index.to_numpy() for v in used.values()]))[0]
         # Blocks of one run each tell nothing, and their equations are many.
         if block.max() + 1 < len(block) and all(v.index.is_unique for v in used.values()):
             within = Contrasts(setting, block, run_value)
             if within.are_linked and 0 < apart.df <= 2 * within.df:
-                return Spread(used, within, True)
-        return Spread(used, apart, False)
+                return Spread(used, within, True, unlike)
+        return Spread(used, apart, False, unlike)
 
     def mean(self, label: str) -> float:
         """Mean of a setting, over all blocks alike where they count."""
@@ -123,10 +125,9 @@ class Spread:
     def compare(self, first: str, second: str) -> tuple[float, MeanTest | None]:
         """Test the difference of two means, for all pairs of settings together (Tukey, Kramer).
 
-        Where the two scatter more than all settings do, their own spread counts: the shared one
-        would then call chance a difference. So it does where they scatter so much less that chance
-        would seldom make it so, with their own degrees of freedom (Games and Howell 1976): one wild
-        setting would else hide what calm ones differ by.
+        Where the settings scatter beyond chance unlike each other, the spread of the two and its
+        degrees of freedom count alone (Games and Howell 1976): a wild setting would else hide what
+        calm ones differ by. Elsewhere the two count where they scatter more than all settings do.
 
         Returns
         -------
@@ -139,10 +140,7 @@ class Spread:
             return difference, None
         error, df = contrasts.sd * scale, float(contrasts.df)
         if (own := self._own(first, second, scale)) is not None:
-            ratio = (own[0] / error) ** 2 if error > 0.0 else 1.0
-            if float(scipy.special.fdtr(own[1], df, ratio)) < _CALM:
-                error, df = own
-            error = max(error, own[0])
+            error, df = own if self.are_unlike else (max(error, own[0]), df)
         largest = max(float(self.values[label].abs().max()) for label in (first, second))
         if not error > 1e-12 * largest:
             return difference, None

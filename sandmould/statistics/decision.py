@@ -128,7 +128,7 @@ def _with_limits(
     """With the ends of the sweep, what further runs would do, and how the best one went on."""
     best, verdict = answer.best, answer.verdict
     assert best is not None
-    ends = _ends(best, answer.used, answer.asked.keys)
+    ends = _ends(best, verdict.settings, answer.asked.keys, answer.alike)
     known = [errors.get(s.label) for s in (best, verdict.runner_up) if s is not None]
     answer = replace(
         answer,
@@ -198,16 +198,26 @@ def _runs(summary: pd.DataFrame, asked: Asked, setting: Setting) -> list[str]:
     return []
 
 
-def _ends(best: Setting, settings: Sequence[Setting], keys: Sequence[str]) -> tuple[SweepEnd, ...]:
-    """Ends of swept numbers at which the best lies: the true best may lie beyond."""
+def _ends(
+    best: Setting, settings: Sequence[Setting], keys: Sequence[str], alike: Sequence[Setting]
+) -> tuple[SweepEnd, ...]:
+    """Ends of swept numbers at which the best lies: the true best may lie beyond.
+
+    ``settings``: all that were swept, those without a run that counts among them. A key of several
+    is left out where a setting that differs in it alone is as good, see ``alike``.
+    """
     found = []
     for key in keys:
         values = [s.values[key] for s in settings]
         if not all(is_number(v) and math.isfinite(v) for v in values):
             continue
+        others = [{k: v for k, v in s.values.items() if k != key} for s in (best, *alike[1:])]
+        if len(keys) > 1 and others[0] in others[1:]:
+            continue
         mine, low, high = float(best.values[key]), min(values), max(values)
         # Below nothing there is no value to try.
-        if low < high and mine in (low, high) and mine != 0.0:
+        is_known = len({s.values[key] for s in settings if s.n}) > 1
+        if is_known and mine in (low, high) and mine != 0.0:
             found.append(SweepEnd(key, mine, mine == high))
     return tuple(found)
 

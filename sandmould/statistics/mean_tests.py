@@ -3,12 +3,14 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cache
 
 import numpy as np
 import pandas as pd
 import scipy
+from numpy.typing import NDArray
 
 CONFIDENCE = 0.95
 
@@ -86,3 +88,19 @@ def compare_means(
     # Satterthwaite's degrees of freedom; of pairs, one less than there are.
     parts = [v**2 / (len(s) - 1) for v, s in zip(variances, samples, strict=True)]
     return MeanTest(float(x.mean() - y.mean()), error, sum(variances) ** 2 / sum(parts)), paired
+
+
+def alike_pvalue(samples: Sequence[NDArray[np.float64]]) -> float:
+    """Chance of spreads as unlike as those of some samples, if they have one (Bartlett 1937).
+
+    Samples of one value, or of equal ones, tell none.
+    """
+    told = [sample for sample in samples if np.ptp(sample) > 0.0]
+    variance = np.array([sample.var(ddof=1) for sample in told])
+    if len(told) < 2:
+        return 1.0
+    df = np.array([len(sample) - 1 for sample in told])
+    pooled = float(df @ variance) / df.sum()
+    apart = df.sum() * math.log(pooled) - float(df @ np.log(variance))
+    bias = 1.0 + (float((1.0 / df).sum()) - 1.0 / df.sum()) / (3.0 * (len(told) - 1))
+    return float(scipy.special.chdtrc(len(told) - 1, apart / bias))
