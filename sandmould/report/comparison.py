@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 import math
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
@@ -13,11 +14,13 @@ import numpy as np
 
 from sandmould.bad_input import BadInputError, Problem
 from sandmould.definition.study import Study
+from sandmould.definition.sweep import value_at
 from sandmould.drawing.chart import NARROW, WIDE, Chart, Line, Mark, lay_out, tints
 from sandmould.drawing.templates import page_environment
 from sandmould.report.tables import Cell, Column, Table
 from sandmould.runs.files import write_text
 from sandmould.runs.formatting import (
+    display_range,
     display_scale,
     is_number,
     listed,
@@ -26,6 +29,7 @@ from sandmould.runs.formatting import (
     titled,
     with_margin,
 )
+from sandmould.statistics.mean_tests import CONFIDENCE, MeanTest, welch
 from sandmould.statistics.settings import Setting
 from sandmould.statistics.verdict import FEW, compare_settings
 from sandmould.study.collect import Collected, read_collected, read_study
@@ -49,15 +53,27 @@ class ComparedStudy:
     collected: Collected
     verdict: str
     """The first sentence of its report."""
-
-    @property
-    def keys(self) -> tuple[str, ...]:
-        """What it sweeps."""
-        return self.collected.keys
+    keys: tuple[str, ...]
+    """What its settings are told by: what it sweeps, and what others do of which it has a value."""
 
     def settings(self, measure: str) -> tuple[Setting, ...]:
         """Means of a measure at its settings."""
-        return compare_settings(self.collected.of_sweep.summary, self.keys, measure).settings
+        summary = self.collected.of_sweep.summary
+        others = [key for key in self.keys if key not in self.collected.keys]
+        fixed = {key: self.fixed(key) for key in others}
+        # as tables have them
+        fixed |= {key: json.dumps(v) for key, v in fixed.items() if isinstance(v, list | dict)}
+        return compare_settings(summary.assign(**fixed), self.keys, measure).settings
+
+    def fixed(self, key: str) -> Any:
+        """Value of a key that it does not sweep.
+
+        Raises
+        ------
+        KeyError
+            Where it has none.
+        """
+        return value_at(self.study.scenario.model_dump(mode="json"), key)
 
     @cached_property
     def stated(self) -> dict[str, Any]:
@@ -127,8 +143,27 @@ class SideBySide:
             )
             for place, label in enumerate(self.labels)
         ]
-        columns = (Column("setting", False), *(Column(each.name) for each in self.studies))
-        return Table(columns, tuple(rows), (False,) * len(rows))
+        columns = [Column("setting", False), *(Column(each.name) for each in self.studies)]
+        tested = [self._tested(label) for label in self.labels]
+        if len(self.studies) == 2 and any(tested):
+            first, second = (each.name for each in self.studies)
+            columns.append(Column(f"{second} less {first}, 95 %"))
+            rows = [(*row, self._tested_cell(test)) for row, test in zip(rows, tested, strict=True)]
+        told = tuple(test is not None and test.pvalue < 1.0 - CONFIDENCE for test in tested)
+        return Table(tuple(columns), tuple(rows), told)
+
+    def _tested(self, label: str) -> MeanTest | None:
+        """The second study less the first at one setting, by Welch's test."""
+        first, second = (settings.get(label) for settings in self._settings[:2])
+        if first is None or second is None or min(first.n, second.n) < 2:
+            return None
+        return welch(second.mean - first.mean, (first.sd, first.n), (second.sd, second.n))
+
+    def _tested_cell(self, test: MeanTest | None) -> Cell:
+        if test is None:
+            return Cell("–", "nan")
+        ends = test.confidence_interval(CONFIDENCE)
+        return Cell(display_range(self.measure, *ends), str(test.difference))
 
     def differences(self) -> Table:
         """What the studies state differently, but for what they sweep."""
@@ -232,7 +267,7 @@ def read_comparison(folders: Sequence[Path]) -> SideBySide:
         raise BadInputError([Problem("STUDY", str(*folders), "two studies or more")])
     stems = [folder.resolve().name for folder in folders]
     names = [s if stems.count(s) == 1 else str(f) for s, f in zip(stems, folders, strict=True)]
-    studies = tuple(_read(n, f) for n, f in zip(names, folders, strict=True))
+    studies = _alike(tuple(_read(n, f) for n, f in zip(names, folders, strict=True)))
     measure = studies[0].study.objective.measure
     for each in studies:
         summary = each.collected.of_sweep.summary
@@ -240,6 +275,18 @@ def read_comparison(folders: Sequence[Path]) -> SideBySide:
             valid = f"a study with {measure}, which {studies[0].name} is judged by"
             raise BadInputError([Problem("STUDY", each.name, valid)])
     return SideBySide(measure, studies)
+
+
+def _alike(studies: tuple[ComparedStudy, ...]) -> tuple[ComparedStudy, ...]:
+    """Studies whose settings are told by the same keys, where each has a value of all."""
+    keys = tuple(dict.fromkeys(key for each in studies for key in each.keys))
+    try:
+        for each in studies:
+            for key in keys:
+                each.fixed(key)
+    except KeyError:
+        return studies
+    return tuple(replace(each, keys=keys) for each in studies)
 
 
 def _read(name: str, folder: Path) -> ComparedStudy:
@@ -250,7 +297,7 @@ def _read(name: str, folder: Path) -> ComparedStudy:
         study, collected = read_study(folder), read_collected(folder)
         verdict_file = folder / VERDICT_FILE
         said = verdict_file.read_text(encoding="utf-8").strip() if verdict_file.is_file() else "–"
-        return ComparedStudy(name, folder, study, collected, said)
+        return ComparedStudy(name, folder, study, collected, said, collected.keys)
     except (OSError, ValueError) as error:
         valid = f"a folder of results that can be read ({error})"
         raise BadInputError([Problem("STUDY", name, valid)]) from error

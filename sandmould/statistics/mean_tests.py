@@ -81,13 +81,23 @@ def compare_means(
     x = np.asarray(first, dtype=np.float64)
     y = np.asarray(second.reindex(index) if paired else second, dtype=np.float64)
     samples = [x - y] if paired else [x, y]
-    variances = [float(v.var(ddof=1)) / len(v) for v in samples]
-    error = math.sqrt(sum(variances))
-    if error <= 1e-12 * max(float(np.abs(x).max()), float(np.abs(y).max())):
+    test = welch(float(x.mean() - y.mean()), *((float(s.std(ddof=1)), len(s)) for s in samples))
+    if test is None or test.error <= 1e-12 * max(float(np.abs(x).max()), float(np.abs(y).max())):
         return None
-    # Satterthwaite's degrees of freedom; of pairs, one less than there are.
-    parts = [v**2 / (len(s) - 1) for v, s in zip(variances, samples, strict=True)]
-    return MeanTest(float(x.mean() - y.mean()), error, sum(variances) ** 2 / sum(parts)), paired
+    return test, paired
+
+
+def welch(difference: float, *samples: tuple[float, int]) -> MeanTest | None:
+    """Test a difference by standard deviation and number of each sample; None without spread.
+
+    One sample is that of the differences of pairs.
+    """
+    variances = [sd**2 / n for sd, n in samples]
+    if not (total := sum(variances)) > 0.0:
+        return None
+    # Satterthwaite's degrees of freedom; of pairs, one less than there are
+    parts = [v**2 / (n - 1) for v, (_, n) in zip(variances, samples, strict=True)]
+    return MeanTest(difference, math.sqrt(total), total**2 / sum(parts))
 
 
 def alike_pvalue(samples: Sequence[NDArray[np.float64]]) -> float:

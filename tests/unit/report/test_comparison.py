@@ -5,13 +5,17 @@ from __future__ import annotations
 import re
 from pathlib import Path
 
+import pandas as pd
 import pytest
+from scipy import stats
 from typer.testing import CliRunner
 
 from sandmould.cli.commands import app
 from sandmould.report.comparison import read_comparison
+from sandmould.study.collect import collect
 from sandmould.study.plan.plan_files import VERDICT_FILE
 from tests.finished_study import finished_study, study_text
+from tests.unit.report_study import write_study
 
 SWEEP = """\
 based_on: plates
@@ -87,8 +91,25 @@ def test_a_study_that_sweeps_nothing_stands_beside_any_other(
     monkeypatch.chdir(finished)
     for pair in (("alone", other), (other, "alone")):
         found = read_comparison([Path("results") / name for name in pair])
-        assert len(found.labels) == 3
-        assert "the one setting" in found.text()
+        # it is one of the other's settings
+        assert len(found.labels) == len(found.studies[pair.index(other)].settings(found.measure))
+        assert found.has_common_settings
+
+
+def test_two_studies_are_tested_at_a_setting_of_both(tmp_path: Path) -> None:
+    fills = {"short": [0.50, 0.52, 0.54], "long": [0.70, 0.71, 0.75]}
+    for name in fills:
+        study = write_study(tmp_path / name)
+        collect(study)
+        summary = pd.read_csv(study / "summary.tsv", sep="\t")
+        at = summary.index[summary["vibration.0.frequency_hz"] == 50][:3]
+        summary = summary.loc[at].assign(outcome_code=0, tube_fill_fraction=fills[name])
+        summary.to_csv(study / "summary.tsv", sep="\t", index=False)
+    found = read_comparison([tmp_path / name for name in fills])
+    exact = stats.ttest_ind(fills["long"], fills["short"], equal_var=False)
+    low, high = exact.confidence_interval(0.95)
+    (row,) = found.objective_table().rows
+    assert [float(x) for x in row[-1].text.split(" to ")] == pytest.approx([low, high], abs=0.006)
 
 
 def test_what_cannot_be_compared_is_one_sentence(
