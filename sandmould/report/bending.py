@@ -37,8 +37,8 @@ from sandmould.study.collect import Collected
 RECOVERED = "pattern_tip_recovered_m"
 _RECOVERS = 0.02
 """Share of the deflection that must come back before the page says so."""
-_SHAKEN_MORE = 1.1
-"""Times what remains in the end, from which on the most while it was shaken is told."""
+_MORE = 1.1
+"""Times what remains in the end, from which on the most during the run is told."""
 
 
 def bending_pages(
@@ -122,15 +122,16 @@ def _foam_sentences(rows: pd.DataFrame, scenario: Scenario) -> tuple[str, ...]:
     if rows.empty:
         return ()
     last, pattern = rows.iloc[-1], scenario.pattern
-    shaken = rows[rows[VIBRATION_TIME_S] >= 0.0].max(numeric_only=True)
+    most = rows.max(numeric_only=True)
     supports_n = {axis: last.get(f"pattern_support_{axis}_n", 0.0) for axis in "xyz"}
     round_off_n = 1e-9 * max(abs(force_n) for force_n in supports_n.values())
     return sentences(
         "foam.j2",
         largest_mm=1e3 * last["pattern_distance_largest_m"],
-        shaken_mm=1e3 * shaken.get("pattern_distance_largest_m", 0.0),
-        shaken_kpa=1e-3 * shaken.get("pattern_compression_largest_pa", 0.0),
-        most=_SHAKEN_MORE,
+        most_mm=1e3 * most["pattern_distance_largest_m"],
+        most_kpa=1e-3 * most.get("pattern_compression_largest_pa", 0.0),
+        most_crushed=most.get("pattern_crushed_fraction", 0.0),
+        more=_MORE,
         tolerance_mm=1e3 * (pattern.tolerance_m or 0.0),
         outside=last.get("pattern_outside_tolerance_fraction", 0.0),
         von_mises_kpa=1e-3 * last.get("pattern_von_mises_largest_pa", math.nan),

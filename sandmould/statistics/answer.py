@@ -27,6 +27,7 @@ BENDING = (
 """Measures of how far a pattern is bent."""
 OUTSIDE = "pattern_outside_tolerance_fraction"
 FARTHEST = "pattern_distance_largest_m"
+CRUSHED = "pattern_crushed_fraction"
 MOST_QUARTERS = 16
 """Quarters of the vibration, four times as long, after which longer is no advice (argued)."""
 NEARLY_EMPTY = 0.05
@@ -108,6 +109,8 @@ class Answer:
     """Share of a bending pattern's surface beyond its tolerance at that setting, where known."""
     farthest_m: float | None = None
     """Largest distance of that surface from the drawing, where known."""
+    crushed: float = 0.0
+    """Largest share of its foam that was above its crushing strength in a run of that setting."""
     left_out: Mapping[str, int] = field(default_factory=dict)
     """Runs that do not count, by reason."""
     one_way: int = 0

@@ -13,6 +13,7 @@ from sandmould.runs.formatting import OF_BED, filled_space, is_number, setting_t
 from sandmould.scenario.drive import BoxDrive
 from sandmould.statistics.answer import (
     BENDING,
+    CRUSHED,
     FARTHEST,
     OUTSIDE,
     TIP,
@@ -155,7 +156,16 @@ def _with_course(
         passage=passage_of(evidence.curves, runs, measure),
         outside=means.get(OUTSIDE),
         farthest_m=means.get(FARTHEST),
+        crushed=_largest(evidence.curves, runs, CRUSHED) if measure in BENDING else 0.0,
     )
+
+
+def _largest(curves: pd.DataFrame, runs: Sequence[str], measure: str) -> float:
+    """Largest value of a measure in some runs; 0 where it was not taken."""
+    if measure not in curves:
+        return 0.0
+    largest = curves.loc[curves[RUN].astype(str).isin(runs), measure].max()
+    return 0.0 if pd.isna(largest) else float(largest)
 
 
 def _with_target(answer: Answer, goal: Goal, evidence: Evidence, summary: pd.DataFrame) -> Answer:

@@ -179,7 +179,8 @@ def agreement_steps(is_sound: bool) -> list[NextStep]:
 def certificate_steps(study: Study, answer: Answer) -> list[NextStep]:
     """The controls of a best frequency, where none were asked for."""
     is_best = answer.best is not None and study.seeks_best
-    if not is_best or not frequency_key(study.sweep) or study.certificate.controls:
+    is_swept = study.sweep.number_of_points > 1 and frequency_key(study.sweep)
+    if not is_best or not is_swept or study.certificate.controls:
         return []
     fewest = fewest_points(1)
     if study.sweep.number_of_points < fewest:

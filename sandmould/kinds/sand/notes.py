@@ -15,7 +15,7 @@ from sandmould.scenario.cavities import MeshCavity
 from sandmould.scenario.hardness import LEAST_KAPPA, bed_hardness
 from sandmould.scenario.pattern import PatternDrawing
 from sandmould.scenario.scenario import Scenario
-from sandmould.scenario.solids import SolidMesh, drawn_part
+from sandmould.scenario.solids import SolidMesh, drawn_part, drawn_surface
 
 HIGH_ACCELERATION_G = 20.0
 """Peak acceleration above which a plan asks whether the amplitude is meant so."""
@@ -64,10 +64,16 @@ def _of_pattern(scenario: Scenario) -> dict[str, Any]:
     """What a drawn pattern measures, and how good its mesh is."""
     if scenario.pattern is None or not isinstance(scenario.pattern.shape, PatternDrawing):
         return {"pattern": None}
+    from sandmould.pattern_fe.nearest import nearest_on_facets
     from sandmould.pattern_fe.quality import mesh_sentence
     from sandmould.pattern_fe.scene import pattern_of
 
+    pattern = pattern_of(scenario)
+    drawn_m, _ = drawn_surface(scenario.pattern.shape, "pattern.shape")
+    drawn_m = drawn_m + np.array(scenario.pattern.position_m)
+    _, _, place_m = nearest_on_facets(drawn_m, pattern.surface.vertices_m[pattern.surface.facets])
     return {
         "pattern": drawn_part(scenario.pattern.shape, np.array(scenario.box.size_m(3))),
-        "pattern_mesh": mesh_sentence(scenario, pattern_of(scenario)),
+        "pattern_mesh": mesh_sentence(scenario, pattern),
+        "off_mm": 1e3 * float(np.linalg.norm(place_m - drawn_m, axis=1).max()),
     }

@@ -46,7 +46,8 @@ def _notes(
     """Steps that were too long, and what the drive and its controls leave open."""
     stage = scenario.vibrations[0] if scenario.vibrations else None
     has_coarser = PART in collected.summary and (collected.summary[PART] == COARSER.part).any()
-    notes = sand_limits(collected.keys, stage, seeks_best and not is_controlled, bool(has_coarser))
+    varied = [key for key in collected.keys if collected.summary[key].nunique() > 1]
+    notes = sand_limits(varied, stage, seeks_best and not is_controlled, bool(has_coarser))
     return (*_steps_above_limit(collected.summary), *notes)
 
 
