@@ -14,7 +14,7 @@ from scipy import stats
 
 from sandmould.statistics.contrasts import Spread
 from sandmould.statistics.evidence import left_out_counts, one_way_runs
-from sandmould.statistics.mean_tests import compare_means
+from sandmould.statistics.mean_tests import alike_pvalue, compare_means
 from sandmould.statistics.verdict import compare_settings, further_replicates, rank_runs
 
 KEY = "vibration.0.frequency_hz"
@@ -285,6 +285,15 @@ def test_one_wild_setting_hides_no_difference_of_calm_ones() -> None:
     assert test is not None
     assert test.pvalue < 0.01
     assert test.df < 4
+
+
+def test_unlike_spreads_are_told_as_scipy_tells_them() -> None:
+    drawn = np.random.default_rng(4)
+    samples = [drawn.normal(0.0, sd, n) for sd, n in ((1.0, 4), (3.0, 6), (0.5, 3))]
+    assert alike_pvalue(samples) == pytest.approx(stats.bartlett(*samples).pvalue, rel=1e-9)
+    # one without scatter tells nothing
+    assert alike_pvalue([*samples, np.zeros(4)]) == alike_pvalue(samples)
+    assert alike_pvalue([np.zeros(4), samples[0]]) == 1.0
 
 
 def test_three_replicates_of_six_settings_rule_some_out() -> None:
