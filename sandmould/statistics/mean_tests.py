@@ -13,6 +13,9 @@ import scipy
 from numpy.typing import NDArray
 
 CONFIDENCE = 0.95
+_MANY = 10.0
+"""Times as many replicates from which the search for how many would decide begins."""
+_ROUNDS = 4
 
 
 @dataclass(frozen=True)
@@ -41,12 +44,25 @@ class MeanTest:
 
     def confidence_interval(self, level: float) -> tuple[float, float]:
         """Interval of the difference."""
-        if self.means > 2:
-            reach = _range_reached(level, self.means, self.df) / math.sqrt(2.0)
-        else:
-            reach = float(scipy.special.stdtrit(self.df, 0.5 + level / 2))
-        half = reach * self.error
+        half = self._reach(level, self.df) * self.error
         return self.difference - half, self.difference + half
+
+    def factor_to_tell(self) -> float:
+        """Times as many replicates with which the interval would leave zero out.
+
+        The error goes as the root of their number, and degrees of freedom grow with it.
+        """
+        times = _MANY
+        for _ in range(_ROUNDS):
+            reach = self._reach(CONFIDENCE, round(times * self.df))
+            times = max(1.0, (reach * self.error / self.difference) ** 2)
+        return times
+
+    def _reach(self, level: float, df: float) -> float:
+        """Half width of the interval over the error."""
+        if self.means > 2:
+            return _range_reached(level, self.means, df) / math.sqrt(2.0)
+        return float(scipy.special.stdtrit(df, 0.5 + level / 2))
 
 
 @cache

@@ -129,9 +129,6 @@ def rank_runs(summary: pd.DataFrame, measure: str, better: Better = "larger") ->
 def further_replicates(comparisons: Sequence[Comparison], best: Setting) -> int | None:
     """How many more replicates would tell the best from those that it cannot be told from.
 
-    An interval shrinks with the root of the number of replicates, so that it leaves zero out once
-    n (half width / difference)^2 of them are there.
-
     Returns
     -------
     int or None
@@ -141,5 +138,5 @@ def further_replicates(comparisons: Sequence[Comparison], best: Setting) -> int 
     open_ones = [c for c in comparisons if c.tested and not c.separated]
     if not open_ones or min(abs(c.difference) for c in open_ones) <= 0.0:
         return None
-    needed = max(best.n * ((c.ci[1] - c.ci[0]) / 2 / c.difference) ** 2 for c in open_ones)
-    return math.ceil(needed) - best.n
+    needed = max(c.test.factor_to_tell() for c in open_ones if c.test is not None)
+    return math.ceil(needed * best.n) - best.n

@@ -257,6 +257,8 @@ def _fields(
     if not risers and has_modulus and math.isfinite(frozen.solidification_time_s):
         modulus_mm = 1e3 * float(np.nanmax(fields["modulus_m"]))  # the last to freeze has the most
         riser = (step("riser", it=frozen, modulus_mm=modulus_mm),)
+    elif risers and fed and fed.cut_off:
+        riser = (step("feed", it=fed.cut_off[0].region, others=len(fed.cut_off) - 1),)
     return png(figure, has_scales=True), first, said, tables, fed, riser
 
 

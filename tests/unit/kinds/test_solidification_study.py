@@ -259,7 +259,12 @@ def test_a_short_riser_leaves_a_plate_without_feed(tmp_path: Path) -> None:
     assert 0.004 < np.nanmax(fields["modulus_m"]) < 0.0102
     assert "cut_off_fraction" in (folder / "measures.tsv").read_text()
     own = fields["melts"] & ~fields["riser"]
-    text = _fields(folder, read_run(folder / "scenario.yaml").scenario)[2][0]
+    found = _fields(folder, read_run(folder / "scenario.yaml").scenario)
+    text, (next_step,) = found[2][0], found[5]
+    where = found[2][1].partition(" of liquid (")[2].partition(")")[0]
+    assert next_step.text == (
+        f"Let a riser reach the liquid that is cut off at {where}, or a chill freeze it early."
+    )
     first, risers = (np.nanmax(fields["frozen_s"][part]) for part in (own, fields["riser"]))
     assert text.startswith(f"Last: the part is solid after {number(first)} s, last at x = ")
     ending = f"; the risers are after {number(risers)} s." if risers > first else (
