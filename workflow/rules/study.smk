@@ -65,7 +65,9 @@ try:
         SUBMISSION.ask(BATCHED)
     if workflow.is_main_process and "--lint" not in sys.argv:
         # A dry run starts no engine, and nothing is measured for runs that are all there.
-        computes = starts and any(lack.need is Need.COMPUTE for lack in LACKING.values())
+        computes = starts and any(
+            lack.need is Need.COMPUTE for lack in LACKING.values()
+        )
         say(announce(PLAN, RESULTS, CORES, "all" if computes else "nothing"))
         if said := prepare(PLAN, RESULTS, BATCHED, LACKING):
             say(f"{said}\n")
