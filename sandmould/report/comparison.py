@@ -149,8 +149,7 @@ class SideBySide:
             first, second = (each.name for each in self.studies)
             columns.append(Column(f"{second} less {first}, 95 %"))
             rows = [(*row, self._tested_cell(test)) for row, test in zip(rows, tested, strict=True)]
-        told = tuple(test is not None and test.pvalue < 1.0 - CONFIDENCE for test in tested)
-        return Table(tuple(columns), tuple(rows), told)
+        return Table(tuple(columns), tuple(rows), (False,) * len(rows))
 
     def _tested(self, label: str) -> MeanTest | None:
         """The second study less the first at one setting, by Welch's test."""
@@ -316,6 +315,7 @@ def write_comparison(comparison: SideBySide, out: Path) -> Path:
         beside={name_of(it.measure): it.objective_table() for it in comparison.beside},
         differences=comparison.differences(),
         common=comparison.has_common_settings,
+        key=comparison.key,
         few=FEW,
     )
     write_text(out, page)
