@@ -9,7 +9,7 @@ import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 import pandas as pd
@@ -146,7 +146,7 @@ def _steps(
     has_reference: bool,
     riser: tuple[NextStep, ...],
 ) -> tuple[NextStep, ...]:
-    """A riser where there is none; finer elements, where no reference tells how good these are."""
+    """What feeds the casting; finer elements, where no reference tells how good these are."""
     if has_reference:
         text = "Take these elements for a casting of this kind, and check them once by finer ones."
         return (NextStep(text),)
@@ -197,19 +197,21 @@ def _of_point(summary: pd.DataFrame, reference: Point) -> pd.DataFrame:
     return summary[chosen]
 
 
-def _fields(
-    folder: Path, scenario: Solidification
-) -> tuple[
-    str,
-    FirstPicture | None,
-    tuple[str, ...],
-    tuple[Table, ...],
-    Feeding | None,
-    tuple[NextStep, ...],
-]:
-    """Pictures of a run's fields, what they say in words and tables, and the riser to add."""
+class _Fields(NamedTuple):
+    """What is shown of a run's fields, and what they say."""
+
+    pictures: str = ""
+    first: FirstPicture | None = None
+    said: tuple[str, ...] = ("No run has left fields.",)
+    tables: tuple[Table, ...] = ()
+    fed: Feeding | None = None
+    riser: tuple[NextStep, ...] = ()
+    """What to do where liquid is not fed."""
+
+
+def _fields(folder: Path, scenario: Solidification) -> _Fields:
     if not (folder / "fields.npz").is_file():
-        return "", None, ("No run has left fields.",), (), None, ()
+        return _Fields()
     with np.load(folder / "fields.npz", allow_pickle=False) as file:
         fields = dict(file)
     melts = fields["melts"]
@@ -259,7 +261,7 @@ def _fields(
         riser = (step("riser", it=frozen, modulus_mm=modulus_mm),)
     elif risers and fed and fed.cut_off:
         riser = (step("feed", it=fed.cut_off[0].region, others=len(fed.cut_off) - 1),)
-    return png(figure, has_scales=True), first, said, tables, fed, riser
+    return _Fields(png(figure, has_scales=True), first, said, tables, fed, riser)
 
 
 def _of_part(fields: Mapping[str, Any], scenario: Solidification) -> Freezing | None:

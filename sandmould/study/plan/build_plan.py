@@ -19,6 +19,7 @@ from sandmould.definition.run import Run
 from sandmould.definition.sweep import Point, points
 from sandmould.kinds.kind import AnyScenario, Kind, Planning, SpeedClass
 from sandmould.kinds.registry import kind_named, kind_of
+from sandmould.plain_file import UNREADABLE
 from sandmould.runs.manifest import OUTCOME_FILE
 from sandmould.study.plan.batches import Batch, plan_batches
 from sandmould.study.plan.expand import expand, swept_key
@@ -258,10 +259,12 @@ def _unmeasurable(runs: Sequence[Run], folder: Path) -> list[Problem]:
     if ended is None or lack_of(ended, folder / ended.place).need is not Need.MEASURE:
         return []
     place = folder / ended.place
+    names = list[str]()
+    with contextlib.suppress(*UNREADABLE):  # damaged files: status --deep tells them
+        names = kind_of(ended.scenario).planning.unmeasurable(ended.scenario, place)
     valid = f"a column that {place / 'series.tsv'} has as log_<column>, or that a dump there has"
     return [
-        Problem(f"scenario.measures.{name}", ended.scenario.measures[name], valid)
-        for name in kind_of(ended.scenario).planning.unmeasurable(ended.scenario, place)
+        Problem(f"scenario.measures.{name}", ended.scenario.measures[name], valid) for name in names
     ]
 
 

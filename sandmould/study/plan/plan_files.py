@@ -123,7 +123,7 @@ def changed_line(study: Study, path: Path, folder: Path) -> str:
     known = folder / STUDY_FILE
     if not known.is_file() or known.read_bytes() == _study_text(study).encode():
         return ""
-    return f"{path.name} has changed since: sandmould run brings tables and report up to date"
+    return f"{path.name} is not as it was: sandmould run makes tables and report anew"
 
 
 def _study_text(study: Study) -> str:

@@ -148,6 +148,26 @@ def test_a_part_of_foam_hangs_in_the_sand_by_its_top() -> None:
 
 
 @pytest.mark.slow
+def test_one_speed_and_what_the_table_bears() -> None:
+    options = ["--amplitude-mm", "1.2", "--largest-acceleration-g", "5"]
+    _, plan = written("tube", *options, "--frequency-hz", "30", "30")
+    assert [run.parameters for run in plan.runs][:1] == [{"vibration.0.frequency_hz": 30}]
+    assert len({str(run.parameters) for run in plan.runs}) == 1
+    Path("my_tube.yaml").unlink()
+    _, plan = written("tube", *options, "--frequency-hz", "20", "70")
+    assert plan.beyond_table
+    assert all(point["vibration.0.frequency_hz"] > 32 for point in plan.beyond_table)
+
+
+def test_foam_has_elements_by_its_thinnest_wall() -> None:
+    for wall_mm, element_m in ((3.0, 0.008), (8.0, 0.012), (30.0, 0.016)):
+        trimesh.creation.box(extents=(90.0, 60.0, wall_mm)).export("wall.stl")
+        _, plan = written("part", "--drawing", "wall.stl")
+        found_m = plan.runs[0].scenario.pattern.element_m
+        assert found_m == pytest.approx(element_m, rel=0.15)
+        Path("my_part.yaml").unlink()
+
+
 def test_a_block_hangs_by_the_middle_of_its_top() -> None:
     trimesh.creation.box(extents=(80.0, 60.0, 20.0)).export("block.stl")
     _, plan = written("part", "--drawing", "block.stl")

@@ -21,6 +21,7 @@ from sandmould.pattern_fe.scene import pattern_of
 from sandmould.report.bending import (
     TIP,
     _foam_sentences,
+    _tip_sentences,
     bending_pages,
     deflection_chart,
     paper_sentences,
@@ -119,6 +120,16 @@ def test_limits_of_foam_and_scaled_masses_are_told(study: Path) -> None:
     assert "3 % of the foam is above its crushing strength of 100 kPa" in said
     assert "it swings at 40 % of its own frequency" in said
     assert "bends it by up to 60 % less" in said
+    even = rows.assign(pattern_distance_largest_m=0.01, pattern_compression_largest_pa=1e3)
+    assert "during the run" not in " ".join(_foam_sentences(even, told))
+    # more of each before the end, and the tip above its place
+    more = even.assign(pattern_crushed_fraction=0.0, **{TIP: -0.001})
+    more.loc[more.index[0], ["pattern_distance_largest_m", "pattern_crushed_fraction"]] = 0.02, 0.05
+    said = " ".join(_foam_sentences(more, told))
+    assert "mm from the drawing, during the run up to 20 mm." in said
+    assert "crushing strength of 100 kPa, during the run up to 5 %." in said
+    assert "springs back" not in said
+    assert "bent the tip up by 1 mm" in " ".join(_tip_sentences(more, None, told))
 
 
 def test_a_loop_that_does_not_hold_is_marked(study: Path) -> None:

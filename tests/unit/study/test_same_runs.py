@@ -24,10 +24,12 @@ from sandmould.kinds.registry import kind_of
 from sandmould.runs.hashing import scenario_hash
 from sandmould.runs.manifest import write_manifest
 from sandmould.runs.outcome import Outcome, RunOutcome
+from sandmould.study.plan.announcement import left_line
 from sandmould.study.plan.build_plan import RESULTS, Plan, open_plan
 from sandmould.study.plan.expand import expand
 from sandmould.study.plan.lacking import Need
 from sandmould.study.plan.load_study import open_study
+from sandmould.study.plan.plan_files import changed_line, write_study
 from tests.planned import announce
 
 MESHES = ROOT / "config" / "meshes"
@@ -301,6 +303,15 @@ def test_a_deck_is_only_measured_again_where_another_measure_is_asked(
         series.write_text("time_s\tlog_Step\tlog_KinEng\tlog_PotEng\n", encoding="utf-8")
     plan = open_plan(Path("deck.yaml"))
     assert [lack.need for lack in plan.lacks(RESULTS).values()] == 4 * [Need.MEASURE]
+    assert left_line(plan, RESULTS, 1) == "All runs have ended here: 4; 4 are to be measured.\n"
+    folder, study = RESULTS / "deck", plan.study.study
+    assert "deck.yaml is not as it was" in changed_line(study, plan.study.path, folder)
+    write_study(study, folder)
+    assert changed_line(study, plan.study.path, folder) == ""
+    # a damaged log ends no plan
+    for series in RESULTS.glob("deck/runs/*/series.tsv"):
+        series.write_bytes(b"\xff\x00\n\xff")
+    assert len(open_plan(Path("deck.yaml")).runs) == 4
     # one that ended for a measure which its log lacked
     (folder,) = RESULTS.glob(f"deck/runs/{plan.runs[0].run}")
     RunOutcome(Outcome.BAD_INPUT, "the log lacks it", 1.0, 1.0).write(folder / "outcome.json")
