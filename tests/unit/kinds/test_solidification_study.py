@@ -28,7 +28,7 @@ from sandmould.analysis.freezing_plots import (
 from sandmould.bad_input import BadInputError
 from sandmould.casting.arpm import computation
 from sandmould.execution.simulate import export_run, measure_run, render_run, simulate
-from sandmould.report.kinds.solidification import _fields, distance_from
+from sandmould.report.kinds.cast_fields import cast_fields, distance_from
 from sandmould.report.page import write_report
 from sandmould.runs import checkpoint_file
 from sandmould.runs.checkpoint_file import CheckpointFile
@@ -259,7 +259,7 @@ def test_a_short_riser_leaves_a_plate_without_feed(tmp_path: Path) -> None:
     assert 0.004 < np.nanmax(fields["modulus_m"]) < 0.0102
     assert "cut_off_fraction" in (folder / "measures.tsv").read_text()
     own = fields["melts"] & ~fields["riser"]
-    found = _fields(folder, read_run(folder / "scenario.yaml").scenario)
+    found = cast_fields(folder, read_run(folder / "scenario.yaml").scenario)
     text, (next_step,) = found[2][0], found[5]
     where = found[2][1].partition(" of liquid (")[2].partition(")")[0]
     assert next_step.text == (
@@ -270,6 +270,28 @@ def test_a_short_riser_leaves_a_plate_without_feed(tmp_path: Path) -> None:
     ending = f"; the risers are after {number(risers)} s." if risers > first else (
         "; that is later than the risers.")  # fmt: skip
     assert text.endswith(ending)
+
+
+def test_both_halves_are_told_and_a_riser_that_is_too_low(tmp_path: Path) -> None:
+    def shape(*corners: float) -> dict[str, Any]:
+        return {"kind": "rectangle", "low_m": [*corners[:2]], "high_m": [*corners[2:]]}
+
+    left, right = shape(0.01, 0.02, 0.025, 0.06), shape(0.055, 0.02, 0.07, 0.06)
+    bar, riser = shape(0.025, 0.0375, 0.055, 0.0425), shape(0.035, 0.0325, 0.045, 0.0475)
+    for shapes, is_low in (([left, right, bar, riser], True), ([bar, left, riser], False)):
+        if not is_low:
+            shapes[1] = shape(0.01, 0.02, 0.025, 0.0475)
+        folder = measured(tmp_path, shapes=shapes, risers=[shapes.index(riser)], record_s=1.0,
+                          element_m=0.0025)  # fmt: skip
+        found = cast_fields(folder, read_run(folder / "scenario.yaml").scenario)
+        told = " ".join(found.said)
+        steps = " ".join(it.text for it in found.riser)
+        assert ("So is 1 place of the same size." in told) == is_low
+        assert ("so too the other place of that size" in steps) == is_low
+        above = "Height: the part reaches 12.5 mm higher than its risers, if y points up."
+        assert (above in told) == is_low
+        assert ("at least 12.5 mm higher, or turn" in steps) == is_low
+        assert "path to the nearest riser, mm" in [column.title for column in found.tables[1].columns]
 
 
 def test_what_a_riser_shares_with_the_part_is_riser(tmp_path: Path) -> None:
@@ -289,7 +311,7 @@ def test_what_a_riser_shares_with_the_part_is_riser(tmp_path: Path) -> None:
         assert last["part_solidification_time_s"] == pytest.approx(part_s)
         assert part_s < last["solidification_time_s"]
         assert found[-1]["volume_m3"][own].sum() == pytest.approx(600e-6)
-        said = _fields(folder, read_run(folder / "scenario.yaml").scenario)[2]
+        said = cast_fields(folder, read_run(folder / "scenario.yaml").scenario)[2]
         assert "; the risers are after" in said[0]
         assert said[1].startswith("Feeding: the risers feed all of the casting")
     for name in found[0].files:
@@ -300,7 +322,7 @@ def test_what_a_riser_shares_with_the_part_is_riser(tmp_path: Path) -> None:
 def test_pictures_outline_risers_and_have_all_colours(tmp_path: Path) -> None:
     riser = BAR | {"low_m": [0.03, 0.05], "high_m": [0.05, 0.07]}
     folder = one_run(tmp_path, shapes=[BAR, riser], risers=[1])
-    picture = _fields(folder, read_run(folder / "scenario.yaml").scenario)[0].partition(",")[2]
+    picture = cast_fields(folder, read_run(folder / "scenario.yaml").scenario)[0].partition(",")[2]
     with Image.open(io.BytesIO(base64.b64decode(picture))) as image:
         assert len(image.convert("RGB").getcolors(1 << 20) or ()) > 512
     fields = dict(np.load(folder / "fields.npz"))
@@ -320,7 +342,7 @@ def test_a_place_that_freezes_with_the_last_is_counted(tmp_path: Path) -> None:
         ([BAR], "."),
     ):
         folder = measured(tmp_path, shapes=shapes)
-        _, _, said, _, _, (riser,) = _fields(folder, read_run(folder / "scenario.yaml").scenario)
+        _, _, said, _, _, (riser,) = cast_fields(folder, read_run(folder / "scenario.yaml").scenario)
         place = said[0].partition(", last at ")[2]
         assert place.endswith(f" mm{beside}")
         # nothing is named as a riser
