@@ -102,6 +102,7 @@ def _advance(
     ``place`` is its displacement: the first two are given, the others are found.
     """
     done, state = steps, DONE
+    one = np.int64(1)  # for a literal numba would compile it once more
     for k in range(steps):
         if thread == 0 and not drifted:
             sand = sand_force(dim, moving.grains.force, scene.direction)
@@ -111,7 +112,7 @@ def _advance(
             )  # fmt: skip
         wait_for_all(team.barrier, threads)
         _, state = advance(
-            dim, 1, drifted, scene, moving, place[k:], half_skin, thread, threads, team
+            dim, one, drifted, scene, moving, place[k:], half_skin, thread, threads, team
         )
         if state != DONE:
             done = k

@@ -77,4 +77,7 @@ class RestWatch:
                 f", vertical loads {100 * self.load_error:+.2g} % off the sand's weight "
                 f"(rest.load_tolerance {100 * (self.rest.load_tolerance or 0.0):g} %)"
             )
-        return f"at the last check: {found}{'; ' if self.last_held else ''}{self.last_held}"
+        found = f"at the last check: {found}"
+        if self.last_held and self.sand_rests:
+            return f"the sand itself was at rest, but {self.last_held}; {found}"
+        return f"{found}{'; ' if self.last_held else ''}{self.last_held}"

@@ -71,12 +71,13 @@ def _advance(
     """See ``steps.advance``, which computes every step; the mover comes before each."""
     walls = moving.walls
     done, state = steps, DONE
+    one = np.int64(1)  # for a literal numba would compile it once more
     for k in range(steps):
         if thread == 0 and not drifted:
             _set_motion(walls, mover, first_step + k)
         wait_for_all(team.barrier, threads)
         _, state = advance(
-            dim, 1, drifted, scene, moving, displacement[k:], half_skin, thread, threads, team
+            dim, one, drifted, scene, moving, displacement[k:], half_skin, thread, threads, team
         )
         if state != DONE:
             done = k

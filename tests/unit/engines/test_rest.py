@@ -68,7 +68,7 @@ def test_a_held_stage_goes_on_until_the_checks_pass_without_it() -> None:
         held.check(SLOW_M_S, WEIGHT_N, WEIGHT_N)
     assert held.sand_rests
     assert not held.at_rest
-    assert held.sentence.endswith("the pattern creeps")
+    assert held.sentence.startswith("the sand itself was at rest, but the pattern creeps; at the")
     assert seen(held, [SLOW_M_S] * 3, [1.0] * 3) == [False, False, True]
 
 
