@@ -12,6 +12,7 @@ from typing import Any
 from sandmould.runs.formatting import (
     OF_BED,
     display_scale,
+    factor_text,
     filled_space,
     is_number,
     listed,
@@ -123,7 +124,7 @@ class Span:
     steepest: tuple[str, str] = ("", "")
     """Labels between which it changes most, where that is more than chance."""
     apart: str = ""
-    """By how much the highest differs from the lowest, where that is tested."""
+    """By how much the highest is more than the lowest, where that is tested."""
 
 
 @dataclass(frozen=True)
@@ -257,8 +258,10 @@ class AnswerWords:
 
     @property
     def difference(self) -> str:
-        """Of the best from the next, without a sign."""
+        """Of the best from the next, without a sign; the factor between them where that is told."""
         verdict = self.answer.verdict
+        if verdict.by_factor:
+            return factor_text(verdict.difference, *verdict.ci)
         half = self.answer.numerical_error or math.nan
         if self.answer.asked.by_lot:
             half = (verdict.ci[1] - verdict.ci[0]) / 2.0
@@ -341,10 +344,11 @@ class AnswerWords:
     def span(self) -> Span:
         """The measure over the sweep."""
         used = self.answer.used
-        largest = max(abs(s.mean) for s in used)
+        is_wide = self.answer.verdict.is_wide
+        nothing = 0.0 if is_wide else NOTHING * max(abs(s.mean) for s in used)
 
         def told(s: Setting) -> tuple[str, str]:
-            if abs(s.mean) < NOTHING * largest:
+            if abs(s.mean) < nothing:
                 return f"about {self.value(0.0)}", s.label
             return self.value(s.mean, s.ci_half_width), s.label
 
@@ -353,17 +357,22 @@ class AnswerWords:
         apart = ""
         if against is not None and against.tested:
             half = (against.ci[1] - against.ci[0]) / 2.0
-            apart = self.value(abs(against.difference), half)
+            more = f"{self.value(abs(against.difference), half)} more"
+            is_factor = against.is_factor
+            apart = factor_text(against.difference, *against.ci) if is_factor else more
         if not self.is_scale or len(used) < 4:
             return Span(low, high, apart=apart)
-        first = next(i for i, s in enumerate(used) if abs(s.mean) >= NOTHING * largest)
+        first = next(i for i, s in enumerate(used) if abs(s.mean) >= nothing)
         if 0 < first < len(used) - 1:
             at = told(used[first]), told(used[-1])
             return Span(low, high, used[first - 1].label, *at)
         pairs = list(itertools.pairwise(used))
-        steps = [abs(after.mean - before.mean) for before, after in pairs]
+        # of logarithms where those are told, with intervals as shares
+        of = {s.label: math.log(s.mean) if is_wide else s.mean for s in used}
+        reach = {s.label: s.ci_half_width / (s.mean if is_wide else 1.0) for s in used}
+        steps = [abs(of[after.label] - of[before.label]) for before, after in pairs]
         chance = [
-            before.ci_half_width + after.ci_half_width if self.asked.by_lot else 0.0
+            reach[before.label] + reach[after.label] if self.asked.by_lot else 0.0
             for before, after in pairs
         ]
         k = steps.index(max(steps))
