@@ -32,7 +32,7 @@ from sandmould.wording.answer import why_unused
 _POINTS = 12_000
 """Points of all curves of one chart; more would only make the page heavy."""
 _SHOWN_BELOW = 0.01
-"""Share of the least end down to which a logarithmic axis may reach: curves may begin at nothing."""
+"""Share of the least end to which a logarithmic axis reaches down: curves may begin at nothing."""
 _MOST_LABELS = 18
 _MOST_ROWS = 30
 

@@ -48,14 +48,22 @@ class Comparison:
     difference: float
     test: MeanTest | None
     """None where replicates are too few or identical."""
-    is_factor: bool = False
+    is_factor: bool
     """Whether logarithms were tested: the difference is then the best over the other one."""
+
+    @staticmethod
+    def of(
+        other: str, difference: float, test: MeanTest | None, are_logarithms: bool
+    ) -> Comparison:
+        """By a difference of values or of logarithms."""
+        apart = _factor(difference) if are_logarithms else difference
+        return Comparison(other, apart, test, are_logarithms)
 
     @property
     def ci(self) -> tuple[float, float]:
         """95 % interval; NaN without a test."""
         low, high = self._tested
-        return (factor(low), factor(high)) if self.is_factor else (low, high)
+        return (_factor(low), _factor(high)) if self.is_factor else (low, high)
 
     @property
     def _tested(self) -> tuple[float, float]:
@@ -137,16 +145,13 @@ def compare(
     best: Setting, others: Sequence[Setting], spread: Spread, are_logarithms: bool = False
 ) -> tuple[Comparison, ...]:
     """The best minus each other setting, nearest first; over it where these are logarithms."""
-    found = []
-    for other in others:
-        difference, test = spread.compare(best.label, other.label)
-        apart = factor(difference) if are_logarithms else difference
-        found.append(Comparison(other.label, apart, test, are_logarithms))
-    return tuple(found)
+    return tuple(
+        Comparison.of(other.label, *spread.compare(best.label, other.label), are_logarithms)
+        for other in others
+    )
 
 
-def factor(logarithm: float) -> float:
-    """What a difference of logarithms is as a factor."""
+def _factor(logarithm: float) -> float:
     return math.exp(min(logarithm, _MOST_LOGARITHM))
 
 

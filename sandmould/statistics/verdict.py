@@ -46,6 +46,8 @@ class Verdict:
     """The best against every other setting, nearest first."""
     is_wide: bool
     """Whether the means are all above zero and apart by a factor of ``WIDE_MEASURE`` or more."""
+    spread: Spread | None
+    """Of the runs, or of their logarithms where these are compared; None without a value."""
 
     @property
     def by_factor(self) -> bool:
@@ -88,7 +90,7 @@ def compare_settings(
     settings = tuple(setting_of(*group) for group in groups)
     of_setting = {s.label: group[2] for s, group in zip(settings, groups, strict=True)}
     wide = is_wide(measure, settings, in_blocks)
-    ranked, comparisons = _ranked(settings, of_setting, better, wide)
+    ranked, comparisons, spread = _ranked(settings, of_setting, better, wide)
     first = comparisons[0] if comparisons else None
     resolved = first is not None and first.separated
     return Verdict(
@@ -103,6 +105,7 @@ def compare_settings(
         resolved=resolved and all(c.separated for c in comparisons if c.tested),
         comparisons=comparisons,
         is_wide=wide,
+        spread=spread,
     )
 
 
@@ -111,20 +114,20 @@ def _ranked(
     values: Mapping[str, pd.Series[float]],
     better: Better,
     by_logarithm: bool,
-) -> tuple[list[Setting], tuple[Comparison, ...]]:
+) -> tuple[list[Setting], tuple[Comparison, ...], Spread | None]:
     """Settings that have values, the best first, and the best against each of the others.
 
     Logarithms that are not tested tell nothing more than the values.
     """
     used = [s for s in settings if s.n]
     if not used:
-        return [], ()
+        return [], (), None
     spread = Spread.of({k: np.log(v) for k, v in values.items()} if by_logarithm else values)
     used.sort(key=lambda s: spread.mean(s.label), reverse=better == "larger")
     comparisons = compare(used[0], used[1:], spread, by_logarithm)
     if by_logarithm and not any(c.tested for c in comparisons):
         return _ranked(settings, values, better, by_logarithm=False)
-    return used, comparisons
+    return used, comparisons, spread
 
 
 def rank_runs(summary: pd.DataFrame, measure: str, better: Better = "larger") -> dict[str, str]:

@@ -12,6 +12,7 @@ from typing import Any
 from sandmould.runs.formatting import (
     OF_BED,
     display_scale,
+    distinct_names,
     factor_text,
     filled_space,
     is_number,
@@ -29,8 +30,9 @@ from sandmould.scenario.drive import BoxDrive
 from sandmould.scenario.vibration import VibrationStage
 from sandmould.statistics.answer import Answer, Decided
 from sandmould.statistics.config import FULL_SHARE
+from sandmould.statistics.main_effects import main_effects
 from sandmould.statistics.refining import Refining
-from sandmould.statistics.settings import Setting
+from sandmould.statistics.settings import Comparison, Setting
 from sandmould.statistics.verdict import FEW
 
 MOST_NAMED = 100
@@ -94,6 +96,24 @@ def why_unused(why: str) -> str:
     if why in states:
         return f"not used: its loop {states[why]}"
     return "not used: no value of the objective" if why == "no value" else ""
+
+
+def main_effect_sentences(answer: Answer) -> tuple[str, ...]:
+    """What each of several swept keys does, on average over the others."""
+    keys, words = answer.asked.keys, AnswerWords(answer)
+    names = distinct_names(keys)
+    effects = [
+        {
+            "name": names[it.key],
+            "others": [names[key] for key in keys if key != it.key],
+            "high": value_text(it.key, it.high),
+            "low": value_text(it.key, it.low),
+            "apart": it.apart,
+            "text": words.apart(it.apart),
+        }
+        for it in main_effects(answer.verdict, keys)
+    ]
+    return sentences("main_effects.j2", effects=effects, measure=answer.asked.measure)
 
 
 def place_text(label: str, keys: Sequence[str], drive: BoxDrive | None, more: str = "") -> str:
@@ -261,11 +281,18 @@ class AnswerWords:
         """Of the best from the next, without a sign; the factor between them where that is told."""
         verdict = self.answer.verdict
         if verdict.by_factor:
-            return factor_text(verdict.difference, *verdict.ci)
+            return self.apart(verdict.comparisons[0])
         half = self.answer.numerical_error or math.nan
         if self.answer.asked.by_lot:
             half = (verdict.ci[1] - verdict.ci[0]) / 2.0
         return self.value(abs(verdict.difference), half)
+
+    def apart(self, of: Comparison) -> str:
+        """By how much two values differ, without a sign, or the factor between them."""
+        low, high = of.ci
+        if of.is_factor:
+            return factor_text(of.difference, low, high)
+        return self.value(abs(of.difference), (high - low) / 2.0)
 
     @property
     def is_of_means(self) -> bool:
@@ -356,10 +383,7 @@ class AnswerWords:
         against = self.answer.verdict.against(max(used, key=lambda s: s.mean))
         apart = ""
         if against is not None and against.tested:
-            half = (against.ci[1] - against.ci[0]) / 2.0
-            more = f"{self.value(abs(against.difference), half)} more"
-            is_factor = against.is_factor
-            apart = factor_text(against.difference, *against.ci) if is_factor else more
+            apart = self.apart(against) + ("" if against.is_factor else " more")
         if not self.is_scale or len(used) < 4:
             return Span(low, high, apart=apart)
         first = next(i for i, s in enumerate(used) if abs(s.mean) >= nothing)
