@@ -6,7 +6,6 @@ import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
-import numpy as np
 import pandas as pd
 
 from sandmould.runs.columns import RUN
@@ -122,7 +121,7 @@ def _ranked(
     used = [s for s in settings if s.n]
     if not used:
         return [], (), None
-    spread = Spread.of({k: np.log(v) for k, v in values.items()} if by_logarithm else values)
+    spread = Spread.of({k: v.map(math.log) for k, v in values.items()} if by_logarithm else values)
     used.sort(key=lambda s: spread.mean(s.label), reverse=better == "larger")
     comparisons = compare(used[0], used[1:], spread, by_logarithm)
     if by_logarithm and not any(c.tested for c in comparisons):
