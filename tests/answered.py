@@ -179,14 +179,22 @@ ENERGIES_J = {1e5: (2.0e-7, 2.3e-7, 1.9e-7), 1e6: (3.1e-5, 2.6e-5, 2.9e-5), 1e7:
 
 def far_apart() -> Answer:
     """Kinetic energies of which each scatters by more than the next smaller one has."""
-    return answered(table("values.modulus_pa", kinetic_j=ENERGIES_J), "kinetic_j",
-                    ["values.modulus_pa"], "neither")  # fmt: skip
+    return answered(
+        table("values.modulus_pa", kinetic_j=ENERGIES_J),
+        "kinetic_j",
+        ["values.modulus_pa"],
+        "neither",
+    )
 
 
 def far_apart_and_least() -> Answer:
     """The same where little of it is good."""
-    return answered(table("values.modulus_pa", kinetic_j=ENERGIES_J), "kinetic_j",
-                    ["values.modulus_pa"], "smaller")  # fmt: skip
+    return answered(
+        table("values.modulus_pa", kinetic_j=ENERGIES_J),
+        "kinetic_j",
+        ["values.modulus_pa"],
+        "smaller",
+    )
 
 
 def a_bent_part() -> Answer:

@@ -31,12 +31,17 @@ def test_curves_that_end_decades_apart_begin_at_the_foot() -> None:
     summary = table(MODULUS, kinetic_j=ENERGIES_J).assign(outcome="finished")
     curves = pd.DataFrame(
         [
-            {"run": run, "time_s": time_s, "kinetic_j": time_s * end_j, "stage": "deck",
-             "vibration_time_s": float("nan")}
+            {
+                "run": run,
+                "time_s": time_s,
+                "kinetic_j": time_s * end_j,
+                "stage": "deck",
+                "vibration_time_s": float("nan"),
+            }
             for run, end_j in zip(summary["run"], summary["kinetic_j"], strict=True)
             for time_s in (0.0, 0.5, 1.0)
         ]
-    )  # fmt: skip
+    )
     verdict = compare_settings(summary, [MODULUS], "kinetic_j", "neither")
     chart = time_chart(curves, summary, verdict, [MODULUS], "kinetic_j")
     assert chart is not None

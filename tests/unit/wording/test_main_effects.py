@@ -19,10 +19,17 @@ NOISE = np.random.default_rng(3).normal(0.0, 0.01, 18)
 def grid(replicates: int = 3, factor: float = 0.0) -> pd.DataFrame:
     """Speeds at three angles and two frictions: the angle matters, the friction hardly."""
     rows = [
-        {"run": f"r{n}", ANGLE: angle, FRICTION: friction, "replicate": n, "seed": n,
-         "outcome_code": 0, "speed_m_s": (factor**angle if factor else 0.1 * angle) + NOISE[n]}
+        {
+            "run": f"r{n}",
+            ANGLE: angle,
+            FRICTION: friction,
+            "replicate": n,
+            "seed": n,
+            "outcome_code": 0,
+            "speed_m_s": (factor**angle if factor else 0.1 * angle) + NOISE[n],
+        }
         for n, (angle, friction, _) in enumerate(product((1, 2, 4), (0.3, 0.5), range(replicates)))
-    ]  # fmt: skip
+    ]
     return pd.DataFrame(rows)
 
 
