@@ -173,6 +173,30 @@ def _height(heights_mm: Values) -> Answer:
     )  # fmt: skip
 
 
+ENERGIES_J = {1e5: (2.0e-7, 2.3e-7, 1.9e-7), 1e6: (3.1e-5, 2.6e-5, 2.9e-5), 1e7: (0.2, 0.26, 0.17)}
+"""Over the modulus of the grains."""
+
+
+def far_apart() -> Answer:
+    """Kinetic energies of which each scatters by more than the next smaller one has."""
+    return answered(
+        table("values.modulus_pa", kinetic_j=ENERGIES_J),
+        "kinetic_j",
+        ["values.modulus_pa"],
+        "neither",
+    )
+
+
+def far_apart_and_least() -> Answer:
+    """The same where little of it is good."""
+    return answered(
+        table("values.modulus_pa", kinetic_j=ENERGIES_J),
+        "kinetic_j",
+        ["values.modulus_pa"],
+        "smaller",
+    )
+
+
 def a_bent_part() -> Answer:
     """A part whose shaken surface swings and comes to rest farther from its drawing than passes."""
     rest = {"stage": "rest", "vibration_time_s": 0.1, BENT: 0.988e-3}
@@ -207,5 +231,6 @@ QUESTIONS: Mapping[str, Callable[[], Answer]] = {
     each.__name__: each
     for each in (none_reaches, several_reach, best_at_an_end, two_cavities, one_value, no_chance,
                  finest, no_effect, smaller_while_rising, failing_loops, amplitude_swept, too_wide,
-                 by_chance, a_course, a_bent_part, none_is_shown_to_reach)
+                 by_chance, a_course, far_apart, far_apart_and_least, a_bent_part,
+                 none_is_shown_to_reach)
 }  # fmt: skip

@@ -127,8 +127,9 @@ class Chart:
     areas: tuple[Area, ...] = ()
     frame: tuple[Range, Range] | None = None
     """Ends of both axes; round the values unless given."""
-    is_logarithmic: bool = False
-    """Whether both axes are; what is not above zero then has no place."""
+    log_x: bool = False
+    log_y: bool = False
+    """Whether an axis is logarithmic; a point that is not above zero then has no place."""
 
 
 @dataclass(frozen=True)
@@ -149,6 +150,10 @@ class Axis:
                 return math.nan
             low, high, value = math.log10(low), math.log10(high), math.log10(value)
         return self.start + (value - low) / (high - low) * (self.end - self.start)
+
+    def reached(self, value: float) -> float:
+        """The same, at the axis' low end where a logarithmic one has none."""
+        return self.at(max(value, self.low) if self.is_logarithmic else value)
 
 
 @dataclass(frozen=True)
@@ -220,26 +225,24 @@ def lay_out(chart: Chart, size: tuple[int, int]) -> Laid:
     width, height = float(size[0]), float(size[1])
     if chart.rows:
         height = 66.0 + 42.0 * len(chart.rows)
-    log = chart.is_logarithmic
-    y_low, y_high = _log_range(_ys(chart)) if log else _range(_ys(chart))
+    y_low, y_high = _log_range(_ys(chart)) if chart.log_y else _range(_ys(chart))
     if chart.frame:
         y_low, y_high = chart.frame[1]
-    ticks_of = _log_ticks if log else _round_ticks
-    y_ticks = () if chart.rows else ticks_of(y_low, y_high, max(3, int(height / 55)))
-    y_text = [_text(t, y_ticks, log) for t in y_ticks]
+    y_ticks = () if chart.rows else _ticks(y_low, y_high, max(3, int(height / 55)), chart.log_y)
+    y_text = [_text(t, y_ticks, chart.log_y) for t in y_ticks]
     margin = 14.0 if chart.rows else 12.0 + _CHARACTER * max(map(len, y_text), default=1)
     label = max((len(line.label) for line in chart.lines), default=0)
     xs = _xs(chart)
-    x_low, x_high = _log_range(xs) if log else _range(xs, tight=not chart.marks)
+    x_low, x_high = _log_range(xs) if chart.log_x else _range(xs, tight=not chart.marks)
     if chart.frame:
         x_low, x_high = chart.frame[0]
     beside = 30.0 if any(m.shift_px for m in chart.marks) else 0.0
     right = width - (12.0 + _BOLD * label if label else 16.0)
-    x = Axis(x_low, x_high, margin + beside, right, log)
+    x = Axis(x_low, x_high, margin + beside, right, chart.log_x)
     foot = height - (44.0 if chart.x_title else 26.0)
     y = Axis(-0.7, len(chart.rows) - 0.3, 10.0, foot) if chart.rows else None
-    y = y or Axis(y_low, y_high, foot, 34.0 if chart.y_title else 10.0, log)
-    x_ticks = chart.x_ticks or ticks_of(x_low, x_high, max(4, int(width / 80)))
+    y = y or Axis(y_low, y_high, foot, 34.0 if chart.y_title else 10.0, chart.log_y)
+    x_ticks = chart.x_ticks or _ticks(x_low, x_high, max(4, int(width / 80)), chart.log_x)
     return Laid(
         chart=chart,
         width=width,
@@ -248,7 +251,7 @@ def lay_out(chart: Chart, size: tuple[int, int]) -> Laid:
         foot=foot,
         x=x,
         y=y,
-        x_ticks=_not_touching([Tick(x.at(t), _text(t, x_ticks, log)) for t in x_ticks]),
+        x_ticks=_not_touching([Tick(x.at(t), _text(t, x_ticks, chart.log_x)) for t in x_ticks]),
         y_ticks=tuple(Tick(y.at(t), s) for t, s in zip(y_ticks, y_text, strict=True)),
         rows=tuple(Tick(y.at(i), name) for i, name in enumerate(chart.rows)),
         areas=tuple(_laid_area(area, x, y) for area in chart.areas),
@@ -263,7 +266,7 @@ def _xs(chart: Chart) -> list[float]:
     xs += [*chart.x_ticks, *(chart.band or ())]
     for mark in chart.marks:
         reach = mark.half_width if chart.rows and math.isfinite(mark.half_width) else 0.0
-        xs += [mark.x - reach, mark.x + reach]
+        xs += _ends(mark.x, reach, chart.log_x)
     return xs
 
 
@@ -272,8 +275,14 @@ def _ys(chart: Chart) -> list[float]:
     ys = [v for line in chart.lines for v in line.xy[:, 1].tolist()]
     for mark in chart.marks:
         reach = mark.half_width if math.isfinite(mark.half_width) else 0.0
-        ys += [mark.y - reach, mark.y + reach]
+        ys += _ends(mark.y, reach, chart.log_y)
     return ys
+
+
+def _ends(value: float, reach: float, is_logarithmic: bool) -> list[float]:
+    """Ends of an interval; on a logarithmic axis one towards zero stretches it by a decade."""
+    low = value - reach
+    return [max(low, 0.1 * value) if is_logarithmic else low, value + reach]
 
 
 def _range(values: Sequence[float], tight: bool = False) -> tuple[float, float]:
@@ -286,6 +295,10 @@ def _range(values: Sequence[float], tight: bool = False) -> tuple[float, float]:
         low, high = low - (0.05 * abs(low) or 0.5), high + (0.05 * abs(high) or 0.5)
     margin = 0.0 if tight else 0.06 * (high - low)
     return low - margin, high + margin
+
+
+def _ticks(low: float, high: float, most: int, is_logarithmic: bool) -> tuple[float, ...]:
+    return (_log_ticks if is_logarithmic else _round_ticks)(low, high, most)
 
 
 def _round_ticks(low: float, high: float, most: int) -> tuple[float, ...]:
@@ -340,7 +353,7 @@ def _not_touching(ticks: Sequence[Tick]) -> tuple[Tick, ...]:
 def _laid_area(area: Area, x: Axis, y: Axis) -> LaidArea:
     along = np.concatenate([area.x, area.x[::-1]]).tolist()
     up = np.concatenate([area.low, area.high[::-1]]).tolist()
-    points = (f"{x.at(u):.1f},{y.at(v):.1f}" for u, v in zip(along, up, strict=True))
+    points = (f"{x.at(u):.1f},{y.reached(v):.1f}" for u, v in zip(along, up, strict=True))
     return LaidArea(area, f"M{'L'.join(points)}Z")
 
 
@@ -350,7 +363,7 @@ def _laid_lines(lines: Sequence[Line], x: Axis, y: Axis) -> tuple[LaidLine, ...]
         finite = line.xy[np.isfinite(line.xy).all(axis=1)]
         if not len(finite):
             continue
-        pixels = [(x.at(u), y.at(v)) for u, v in finite.tolist()]
+        pixels = [(x.reached(u), y.reached(v)) for u, v in finite.tolist()]
         path = "M" + "L".join(f"{u:.1f},{v:.1f}" for u, v in pixels)
         laid.append((line, path, pixels[-1]))
     labelled = [(i, end[1]) for i, (line, _, end) in enumerate(laid) if line.label]
@@ -396,5 +409,5 @@ def _laid_mark(mark: Mark, x: Axis, y: Axis, lying: bool) -> LaidMark:
     if not math.isfinite(reach):
         return LaidMark(mark, u + mark.shift_px, v, None)
     if lying:
-        return LaidMark(mark, u, v, (x.at(mark.x - reach), v, x.at(mark.x + reach), v))
-    return LaidMark(mark, u, v, (u, y.at(mark.y - reach), u, y.at(mark.y + reach)))
+        return LaidMark(mark, u, v, (x.reached(mark.x - reach), v, x.at(mark.x + reach), v))
+    return LaidMark(mark, u, v, (u, y.reached(mark.y - reach), u, y.at(mark.y + reach)))

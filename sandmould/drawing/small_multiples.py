@@ -48,7 +48,8 @@ def small_multiples(chart: Chart) -> SmallMultiples | None:
     if len(means) <= MOST_LINES:
         return None
     apart, span = _apart(means)
-    if apart <= ALIKE * span:
+    # settings far enough apart for a logarithmic axis do not lie on each other
+    if not chart.log_y and apart <= ALIKE * span:
         bare = replace(chart, lines=tuple(replace(line, label="") for line in chart.lines))
         note = (
             f"The curves of all {len(means)} settings lie on each other: at any time they differ "
@@ -92,7 +93,8 @@ def _alone(chart: Chart, mean: Line, behind: Sequence[Line], frame: tuple[Range,
     alt = f"{chart.y_title} against {chart.x_title}: {mean.title} before all others{at_end}."
     areas = tuple(area for area in chart.areas if area.group == mean.group)
     front = (replace(line, xy=_thinned(line, _POINTS), label="") for line in own)
-    return Chart("", "", alt, (*behind, *front), areas=areas, frame=frame)
+    lines = (*behind, *front)
+    return replace(chart, x_title="", y_title="", alt=alt, lines=lines, areas=areas, frame=frame)
 
 
 def _thinned(line: Line, most: int) -> np.ndarray:

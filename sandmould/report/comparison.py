@@ -30,7 +30,7 @@ from sandmould.runs.formatting import (
     with_margin,
 )
 from sandmould.statistics.mean_tests import CONFIDENCE, MeanTest, welch
-from sandmould.statistics.settings import Setting
+from sandmould.statistics.settings import WIDE_KEY, Setting, is_wide, spans
 from sandmould.statistics.verdict import FEW, compare_settings
 from sandmould.study.collect import Collected, read_collected, read_study
 from sandmould.study.plan.plan_files import SUMMARY, VERDICT_FILE
@@ -210,6 +210,8 @@ class SideBySide:
             if points:
                 label = each.name
                 lines.append(Line(np.array(points), colours[n], "run", label, label))
+        every = [s for settings in self._settings for s in settings.values()]
+        wide = is_wide(self.measure, every, (s.mean for s in every))
         x_title = titled(self.key) if self.key else what
         ticks = sorted({x for line in lines for x in line.xy[:, 0].tolist()})
         return Chart(
@@ -220,6 +222,8 @@ class SideBySide:
             tuple(marks),
             x_ticks=tuple(ticks) if len(ticks) <= 12 else (),
             rows=tuple(rows),
+            log_x=spans(ticks, WIDE_KEY) if self.key else wide,
+            log_y=wide and bool(self.key),
         )
 
     def text(self) -> str:

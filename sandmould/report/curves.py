@@ -25,12 +25,14 @@ from sandmould.runs.formatting import (
     with_margin,
 )
 from sandmould.statistics.evidence import left_out, shown_values, usable_values
-from sandmould.statistics.settings import Setting, group_settings
-from sandmould.statistics.verdict import FEW, Verdict
+from sandmould.statistics.settings import WIDE_KEY, Setting, group_settings, spans
+from sandmould.statistics.verdict import FEW, Verdict, compare_settings
 from sandmould.wording.answer import why_unused
 
 _POINTS = 12_000
 """Points of all curves of one chart; more would only make the page heavy."""
+_SHOWN_BELOW = 0.01
+"""Share of the least end to which a logarithmic axis reaches down: curves may begin at nothing."""
 _MOST_LABELS = 18
 _MOST_ROWS = 30
 
@@ -91,6 +93,10 @@ def time_chart(
     charted = shaken if len(shaken) else curves
     factor, what = display_scale(measure)
     xy_all = charted[[clock, measure]].to_numpy(dtype=np.float64) * [1.0, factor]
+    log_y = not (xy_all[:, 1] < 0.0).any() and _ends_wide(summary, verdict, keys, measure)
+    if log_y:
+        least = factor * float(usable_values(summary, measure).min())
+        xy_all[:, 1] = np.maximum(xy_all[:, 1], _SHOWN_BELOW * least)
     by_run = {str(run): xy_all[rows] for run, rows in charted.groupby(RUN).indices.items()}
     stride = max(1, len(charted) // _POINTS)
     colour = setting_tints(verdict, keys)
@@ -124,7 +130,14 @@ def time_chart(
             title = f"{setting.label}, mean of {len(complete)}"
             means.append(Line(_thinned(mean, stride), tint, "mean", label, title, setting.label))
     when = "time of vibration, s" if clock == VIBRATION_TIME_S else "time, s"
-    return Chart(when, what, _alt(what, when, means), tuple(lines + means))
+    return Chart(when, what, _alt(what, when, means), tuple(lines + means), log_y=log_y)
+
+
+def _ends_wide(summary: pd.DataFrame, verdict: Verdict, keys: Sequence[str], measure: str) -> bool:
+    """Whether settings end so far apart in a measure that its logarithm is drawn."""
+    if measure == verdict.measure:
+        return verdict.is_wide
+    return measure in summary and compare_settings(summary, keys, measure).is_wide
 
 
 def _labelled(verdict: Verdict) -> set[str]:
@@ -196,6 +209,8 @@ def objective_charts(
                 for run, x, y in zip(summary[RUN], summary[key], values, strict=True)
                 if math.isfinite(y)
             ),
+            log_x=spans(summary[key], WIDE_KEY),
+            log_y=verdict.is_wide,
         )
         for key in numeric
     )
@@ -225,6 +240,8 @@ def _scale_chart(summary: pd.DataFrame, verdict: Verdict, key: str) -> Chart:
         line,
         tuple(marks),
         x_ticks=tuple(places) if len(places) <= 12 else (),
+        log_x=spans(places, WIDE_KEY),
+        log_y=verdict.is_wide,
     )
 
 
@@ -249,6 +266,7 @@ def _row_chart(summary: pd.DataFrame, verdict: Verdict) -> Chart:
         _settings_alt(verdict),
         marks=tuple(marks),
         rows=tuple(s.label for s in ranked),
+        log_x=verdict.is_wide,
     )
 
 

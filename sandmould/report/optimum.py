@@ -169,4 +169,5 @@ def with_surface(chart: Chart, optimum: Optimum, study: Study) -> Chart:
         f"{chart.alt} The fitted curve is best at {number(optimum.setting[key])} {unit_of(key)}, "
         f"95 % interval {number(low)} to {number(high)}."
     )
-    return replace(chart, lines=tuple(lines), band=(low, high), alt=alt)
+    # the fit is one of the values, not of their logarithms
+    return replace(chart, lines=tuple(lines), band=(low, high), alt=alt, log_y=False)

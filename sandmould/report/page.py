@@ -56,7 +56,13 @@ from sandmould.study.plan.ownership import owner_of, shipped_name
 from sandmould.study.plan.plan_files import FIGURES, SPHERES, STUDY_FILE, VERDICT_FILE, read_run
 from sandmould.study.plan.stand_ins import stand_ins
 from sandmould.study.rounds.round_log import read_rounds
-from sandmould.wording.answer import detail_sentences, first_sentence, limit_sentences, reasons_text
+from sandmould.wording.answer import (
+    detail_sentences,
+    first_sentence,
+    limit_sentences,
+    main_effect_sentences,
+    reasons_text,
+)
 from sandmould.wording.next_steps import (
     agreement_steps,
     answer_steps,
@@ -236,7 +242,7 @@ def _render(
         multiples=small_multiples,
         half_sizes=lambda chart: (lay_out(chart, SMALL), lay_out(chart, NARROW)),
         advice=[] if optimum else _beside_mode(page, mode),
-        found=of_kind.findings,
+        found=(*main_effect_sentences(answer), *of_kind.findings),
         warning=of_kind.warning,
         picture=of_kind.picture,
         reported_best=page.study.objective.reported_best,

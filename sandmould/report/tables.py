@@ -168,8 +168,10 @@ def settings_table(verdict: Verdict, drives: Mapping[str, BoxDrive]) -> Table:
     """
     drive = ("amplitude, mm", "velocity, mm/s", "accel., g") if drives else ()
     (factor, named), seeks_best = display_scale(verdict.measure), verdict.better != "neither"
+    by_factor = verdict.by_factor
+    of_apart = 1.0 if by_factor else factor
     of_best = (
-        *map(Column, ("best minus this", "95 % interval", "p")),
+        *map(Column, (f"best {'over' if by_factor else 'minus'} this", "95 % interval", "p")),
         Column("beside the best", False),
     )
     columns = (
@@ -185,10 +187,10 @@ def settings_table(verdict: Verdict, drives: Mapping[str, BoxDrive]) -> Table:
         interval, p, difference = "–", math.nan, math.nan
         standing = "best mean" if is_best else "no run"
         if against is not None:
-            difference, p = factor * against.difference, against.p
+            difference, p = of_apart * against.difference, against.p
             standing = "not tested"
             if against.tested:
-                low, high = (number(factor * end, 2) for end in against.ci)
+                low, high = (number(of_apart * end, 2) for end in against.ci)
                 interval = f"{low} to {high}"
                 standing = "worse" if against.separated else "no clear difference"
         beside_best = (

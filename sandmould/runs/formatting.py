@@ -203,6 +203,14 @@ def display_range(key: str, low: float, high: float) -> str:
     return f"{' to '.join(ends)} {unit}".rstrip()
 
 
+def factor_text(factor: float, low: float, high: float) -> str:
+    """How many times as much something is, with its interval; of less, how many times the other."""
+    if factor < 1.0:
+        factor, low, high = 1.0 / factor, 1.0 / high, 1.0 / low
+    times, *ends = (number(float(f"{x:.2g}"), 2) for x in (factor, low, high))
+    return f"{times} times as much ({' to '.join(ends)})"
+
+
 def value_text(key: str, value: Any) -> str:
     """A swept value with its unit."""
     if isinstance(value, float | int) and not isinstance(value, bool):

@@ -77,11 +77,21 @@ class Contrasts:
 
         Both are NaN where the two have no blocks in common, nor others that link them.
         """
-        apart = self._shares[first] - self._shares[second]
+        weights = np.zeros(len(self.means))
+        weights[first] += 1.0
+        weights[second] -= 1.0
+        return self.weighed(weights)
+
+    def weighed(self, weights: Array) -> tuple[float, float]:
+        """Sum of the means, each by its weight, and its error: as ``difference``.
+
+        ``weights``: (settings,) float64, together zero.
+        """
+        apart = weights @ self._shares
         if np.abs(self._equations @ (self._inverse @ apart) - apart).max() > _ROUND_OFF:
             return math.nan, math.nan
-        variance = 1.0 / self._runs[first] + 1.0 / self._runs[second] + apart @ self._solved @ apart
-        return float(self.means[first] - self.means[second]), math.sqrt(float(variance))
+        variance = float((weights**2 / self._runs).sum() + apart @ self._solved @ apart)
+        return float(weights @ self.means), math.sqrt(variance)
 
 
 @dataclass(frozen=True)

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -16,6 +16,12 @@ from sandmould.runs.columns import REPLICATE, SEED
 from sandmould.runs.formatting import setting_text
 from sandmould.statistics.contrasts import Spread
 from sandmould.statistics.mean_tests import CONFIDENCE, MeanTest
+
+WIDE_MEASURE, WIDE_KEY = 100.0, 30.0
+"""Largest value over the smallest from which a measure and a swept key are told and drawn by their
+logarithm (argued)."""
+_MOST_LOGARITHM = 700.0
+"""Its exponential is a number yet."""
 
 
 @dataclass(frozen=True)
@@ -42,10 +48,25 @@ class Comparison:
     difference: float
     test: MeanTest | None
     """None where replicates are too few or identical."""
+    is_factor: bool
+    """Whether logarithms were tested: the difference is then the best over the other one."""
+
+    @staticmethod
+    def of(
+        other: str, difference: float, test: MeanTest | None, are_logarithms: bool
+    ) -> Comparison:
+        """By a difference of values or of logarithms."""
+        apart = _factor(difference) if are_logarithms else difference
+        return Comparison(other, apart, test, are_logarithms)
 
     @property
     def ci(self) -> tuple[float, float]:
         """95 % interval; NaN without a test."""
+        low, high = self._tested
+        return (_factor(low), _factor(high)) if self.is_factor else (low, high)
+
+    @property
+    def _tested(self) -> tuple[float, float]:
         return self.test.confidence_interval(CONFIDENCE) if self.test else (math.nan, math.nan)
 
     @property
@@ -56,7 +77,8 @@ class Comparison:
     @property
     def separated(self) -> bool:
         """Whether the interval lies on the side of the difference, zero left out."""
-        return self.ci[0] > 0 or self.ci[1] < 0
+        low, high = self._tested
+        return low > 0 or high < 0
 
     @property
     def tested(self) -> bool:
@@ -119,8 +141,33 @@ def by_block(
     return pd.Series(values.to_numpy(), index=[tuple(r) for r in rows.to_numpy().tolist()])
 
 
-def compare(best: Setting, others: Sequence[Setting], spread: Spread) -> tuple[Comparison, ...]:
-    """The best minus each other setting, nearest first."""
+def compare(
+    best: Setting, others: Sequence[Setting], spread: Spread, are_logarithms: bool = False
+) -> tuple[Comparison, ...]:
+    """The best minus each other setting, nearest first; over it where these are logarithms."""
     return tuple(
-        Comparison(other.label, *spread.compare(best.label, other.label)) for other in others
+        Comparison.of(other.label, *spread.compare(best.label, other.label), are_logarithms)
+        for other in others
     )
+
+
+def _factor(logarithm: float) -> float:
+    return math.exp(min(logarithm, _MOST_LOGARITHM))
+
+
+def spans(values: Iterable[float], least: float) -> bool:
+    """Whether values are all above zero, and the largest is so many times the smallest."""
+    known = [value for value in values if math.isfinite(value)]
+    return bool(known) and min(known) > 0.0 and max(known) >= least * min(known)
+
+
+def is_wide(measure: str, settings: Sequence[Setting], values: Iterable[float]) -> bool:
+    """Whether settings differ so much in a measure that its logarithm tells them apart.
+
+    A share has a scale of its own, from 0 to 1.
+
+    ``values``: of all runs.
+    """
+    is_share = measure.endswith("_fraction")
+    means = (s.mean for s in settings if s.n)
+    return not is_share and spans(values, 1.0) and spans(means, WIDE_MEASURE)

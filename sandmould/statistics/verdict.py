@@ -16,6 +16,7 @@ from sandmould.statistics.settings import (
     Comparison,
     Setting,
     compare,
+    is_wide,
     number_blocks,
     setting_of,
     setting_rows,
@@ -35,12 +36,22 @@ class Verdict:
     best: Setting | None
     runner_up: Setting | None
     difference: float
-    """Mean of the best minus that of the runner-up; NaN without two settings."""
+    """Mean of the best minus that of the runner-up, or over it, see ``by_factor``; NaN without two
+    settings."""
     ci: tuple[float, float]
     p: float
     resolved: bool
     comparisons: tuple[Comparison, ...]
     """The best against every other setting, nearest first."""
+    is_wide: bool
+    """Whether the means are all above zero and apart by a factor of ``WIDE_MEASURE`` or more."""
+    spread: Spread | None
+    """Of the runs, or of their logarithms where these are compared; None without a value."""
+
+    @property
+    def by_factor(self) -> bool:
+        """Whether settings are compared by the logarithm: by how many times as much one has."""
+        return any(c.is_factor for c in self.comparisons)
 
     def against(self, setting: Setting) -> Comparison | None:
         """Comparison of the best with a setting."""
@@ -62,7 +73,8 @@ def compare_settings(
     of them drops out of their differences, see ``Spread.of``. Where settings have unlike
     replicates, these differences also rank them. The best is picked after seeing the data:
     intervals and p values hold for all pairs of settings together (Tukey 1953; Kramer 1956 for
-    unlike numbers of replicates).
+    unlike numbers of replicates). Where means differ more than a hundredfold, see ``is_wide``, all
+    this is done with the logarithms: the scatter of the large ones would hide the small ones.
 
     Parameters
     ----------
@@ -76,7 +88,8 @@ def compare_settings(
               setting_rows(summary, keys)]  # fmt: skip
     settings = tuple(setting_of(*group) for group in groups)
     of_setting = {s.label: group[2] for s, group in zip(settings, groups, strict=True)}
-    ranked, comparisons = _ranked(settings, of_setting, better)
+    wide = is_wide(measure, settings, in_blocks)
+    ranked, comparisons, spread = _ranked(settings, of_setting, better, wide)
     first = comparisons[0] if comparisons else None
     resolved = first is not None and first.separated
     return Verdict(
@@ -90,19 +103,30 @@ def compare_settings(
         p=first.p if first else math.nan,
         resolved=resolved and all(c.separated for c in comparisons if c.tested),
         comparisons=comparisons,
+        is_wide=wide,
+        spread=spread,
     )
 
 
 def _ranked(
-    settings: Sequence[Setting], values: Mapping[str, pd.Series[float]], better: Better
-) -> tuple[list[Setting], tuple[Comparison, ...]]:
-    """Settings that have values, the best first, and the best against each of the others."""
+    settings: Sequence[Setting],
+    values: Mapping[str, pd.Series[float]],
+    better: Better,
+    by_logarithm: bool,
+) -> tuple[list[Setting], tuple[Comparison, ...], Spread | None]:
+    """Settings that have values, the best first, and the best against each of the others.
+
+    Logarithms that are not tested tell nothing more than the values.
+    """
     used = [s for s in settings if s.n]
     if not used:
-        return [], ()
-    spread = Spread.of(values)
+        return [], (), None
+    spread = Spread.of({k: v.map(math.log) for k, v in values.items()} if by_logarithm else values)
     used.sort(key=lambda s: spread.mean(s.label), reverse=better == "larger")
-    return used, compare(used[0], used[1:], spread)
+    comparisons = compare(used[0], used[1:], spread, by_logarithm)
+    if by_logarithm and not any(c.tested for c in comparisons):
+        return _ranked(settings, values, better, by_logarithm=False)
+    return used, comparisons, spread
 
 
 def rank_runs(summary: pd.DataFrame, measure: str, better: Better = "larger") -> dict[str, str]:
@@ -136,7 +160,8 @@ def further_replicates(comparisons: Sequence[Comparison], best: Setting) -> int 
         nothing is open, or where too few replicates tell.
     """
     open_ones = [c for c in comparisons if c.tested and not c.separated]
-    if not open_ones or min(abs(c.difference) for c in open_ones) <= 0.0:
+    tests = [c.test for c in open_ones if c.test is not None]
+    if not tests or min(abs(test.difference) for test in tests) <= 0.0:
         return None
-    needed = max(c.test.factor_to_tell() for c in open_ones if c.test is not None)
+    needed = max(test.factor_to_tell() for test in tests)
     return math.ceil(needed * best.n) - best.n

@@ -12,6 +12,8 @@ from typing import Any
 from sandmould.runs.formatting import (
     OF_BED,
     display_scale,
+    distinct_names,
+    factor_text,
     filled_space,
     is_number,
     listed,
@@ -28,8 +30,9 @@ from sandmould.scenario.drive import BoxDrive
 from sandmould.scenario.vibration import VibrationStage
 from sandmould.statistics.answer import Answer, Decided
 from sandmould.statistics.config import FULL_SHARE
+from sandmould.statistics.main_effects import main_effects
 from sandmould.statistics.refining import Refining
-from sandmould.statistics.settings import Setting
+from sandmould.statistics.settings import Comparison, Setting
 from sandmould.statistics.verdict import FEW
 
 MOST_NAMED = 100
@@ -95,6 +98,24 @@ def why_unused(why: str) -> str:
     return "not used: no value of the objective" if why == "no value" else ""
 
 
+def main_effect_sentences(answer: Answer) -> tuple[str, ...]:
+    """What each of several swept keys does, on average over the others."""
+    keys, words = answer.asked.keys, AnswerWords(answer)
+    names = distinct_names(keys)
+    effects = [
+        {
+            "name": names[it.key],
+            "others": [names[key] for key in keys if key != it.key],
+            "high": value_text(it.key, it.high),
+            "low": value_text(it.key, it.low),
+            "apart": it.apart,
+            "text": words.apart(it.apart),
+        }
+        for it in main_effects(answer.verdict, keys)
+    ]
+    return sentences("main_effects.j2", effects=effects, measure=answer.asked.measure)
+
+
 def place_text(label: str, keys: Sequence[str], drive: BoxDrive | None, more: str = "") -> str:
     """A setting as a person sets a table: ``50 Hz (±0.149 mm, 1.5 g)``."""
     said = {key.rpartition(".")[2] for key in keys}
@@ -123,7 +144,7 @@ class Span:
     steepest: tuple[str, str] = ("", "")
     """Labels between which it changes most, where that is more than chance."""
     apart: str = ""
-    """By how much the highest differs from the lowest, where that is tested."""
+    """By how much the highest is more than the lowest, where that is tested."""
 
 
 @dataclass(frozen=True)
@@ -257,12 +278,21 @@ class AnswerWords:
 
     @property
     def difference(self) -> str:
-        """Of the best from the next, without a sign."""
+        """Of the best from the next, without a sign; the factor between them where that is told."""
         verdict = self.answer.verdict
+        if verdict.by_factor:
+            return self.apart(verdict.comparisons[0])
         half = self.answer.numerical_error or math.nan
         if self.answer.asked.by_lot:
             half = (verdict.ci[1] - verdict.ci[0]) / 2.0
         return self.value(abs(verdict.difference), half)
+
+    def apart(self, of: Comparison) -> str:
+        """By how much two values differ, without a sign, or the factor between them."""
+        low, high = of.ci
+        if of.is_factor:
+            return factor_text(of.difference, low, high)
+        return self.value(abs(of.difference), (high - low) / 2.0)
 
     @property
     def is_of_means(self) -> bool:
@@ -341,10 +371,11 @@ class AnswerWords:
     def span(self) -> Span:
         """The measure over the sweep."""
         used = self.answer.used
-        largest = max(abs(s.mean) for s in used)
+        is_wide = self.answer.verdict.is_wide
+        nothing = 0.0 if is_wide else NOTHING * max(abs(s.mean) for s in used)
 
         def told(s: Setting) -> tuple[str, str]:
-            if abs(s.mean) < NOTHING * largest:
+            if abs(s.mean) < nothing:
                 return f"about {self.value(0.0)}", s.label
             return self.value(s.mean, s.ci_half_width), s.label
 
@@ -352,18 +383,20 @@ class AnswerWords:
         against = self.answer.verdict.against(max(used, key=lambda s: s.mean))
         apart = ""
         if against is not None and against.tested:
-            half = (against.ci[1] - against.ci[0]) / 2.0
-            apart = self.value(abs(against.difference), half)
+            apart = self.apart(against) + ("" if against.is_factor else " more")
         if not self.is_scale or len(used) < 4:
             return Span(low, high, apart=apart)
-        first = next(i for i, s in enumerate(used) if abs(s.mean) >= NOTHING * largest)
+        first = next(i for i, s in enumerate(used) if abs(s.mean) >= nothing)
         if 0 < first < len(used) - 1:
             at = told(used[first]), told(used[-1])
             return Span(low, high, used[first - 1].label, *at)
         pairs = list(itertools.pairwise(used))
-        steps = [abs(after.mean - before.mean) for before, after in pairs]
+        # of logarithms where those are told, with intervals as shares
+        of = {s.label: math.log(s.mean) if is_wide else s.mean for s in used}
+        reach = {s.label: s.ci_half_width / (s.mean if is_wide else 1.0) for s in used}
+        steps = [abs(of[after.label] - of[before.label]) for before, after in pairs]
         chance = [
-            before.ci_half_width + after.ci_half_width if self.asked.by_lot else 0.0
+            reach[before.label] + reach[after.label] if self.asked.by_lot else 0.0
             for before, after in pairs
         ]
         k = steps.index(max(steps))

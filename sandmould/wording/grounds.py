@@ -9,7 +9,7 @@ from sandmould.definition.certificate import frequency_key
 from sandmould.definition.study import Study
 from sandmould.kinds.sand.narrow import narrow_spaces, thin_walls
 from sandmould.kinds.sand.table_motion import throws_no_sand
-from sandmould.runs.formatting import display_number
+from sandmould.runs.formatting import display_number, number
 from sandmould.runs.templates import Note, notes
 from sandmould.scenario.hardness import bed_hardness
 from sandmould.scenario.scenario import Scenario
@@ -27,15 +27,17 @@ def scatter_grounds(verdict: Verdict, differ_in: str, seeks_best: bool) -> tuple
         Whether the two best settings are to be compared.
     """
     used = [s for s in verdict.settings if s.n]
-    sds = [s.sd for s in used if math.isfinite(s.sd)]
+    as_share = verdict.is_wide
+    sds = [s.sd / (s.mean if as_share else 1.0) for s in used if math.isfinite(s.sd)]
     sd = math.sqrt(sum(x * x for x in sds) / len(sds)) if sds else math.nan
+    sd_text = f"{number(100 * sd, 2)} %" if as_share else display_number(verdict.measure, sd, 2)
     first = verdict.comparisons[0] if verdict.comparisons and seeks_best else None
     return notes(
         "scatter.j2",
         verdict=verdict,
         runs=[s.n for s in used],
         differ_in=differ_in,
-        sd=display_number(verdict.measure, sd, 2) if sds else "",
+        sd=sd_text if sds else "",
         first=first if first and first.tested and verdict.best else None,
     )
 

@@ -245,6 +245,20 @@ def test_phone_shows_no_part_beside_the_page(page: webdriver.Chrome) -> None:
     page.execute_cdp_cmd("Emulation.clearDeviceMetricsOverride", {})
 
 
+def test_paper_cuts_no_table(page: webdriver.Chrome) -> None:
+    page.execute_cdp_cmd("Emulation.setEmulatedMedia", {"media": "print"})
+    size = {"height": 900, "deviceScaleFactor": 1, "mobile": False}
+    widths = "return [...document.querySelectorAll(arguments[0])].map((e) => e.offsetWidth)"
+    # letters of both kinds less margins: runs lie across
+    for tables, width in (("#runs table", 964), ("section:not(#runs) table", 700)):
+        page.execute_cdp_cmd("Emulation.setDeviceMetricsOverride", {"width": width, **size})
+        found = page.execute_script(widths, tables)
+        assert found
+        assert max(found) <= width
+    page.execute_cdp_cmd("Emulation.clearDeviceMetricsOverride", {})
+    page.execute_cdp_cmd("Emulation.setEmulatedMedia", {"media": ""})
+
+
 def test_no_error_came_up_on_the_way(page: webdriver.Chrome) -> None:
     assert [e for e in page.get_log("browser") if e["level"] == "SEVERE"] == []
 

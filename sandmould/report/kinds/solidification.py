@@ -272,7 +272,8 @@ def _error_charts(errors: Sequence[_Error]) -> tuple[Chart, ...]:
         if marks:
             texts = "; ".join(f"{mark.label}: {mark.title}" for mark in marks)
             alt = f"{what} over processor time by setting. {texts}."
-            charts.append(Chart("processor time, s", what, alt, marks=marks, is_logarithmic=True))
+            cost = "processor time, s"
+            charts.append(Chart(cost, what, alt, marks=marks, log_x=True, log_y=True))
     return tuple(charts)
 
 

@@ -10,6 +10,7 @@ from typing import Literal
 from sandmould.bad_input import BadInputError, Problem
 from sandmould.definition.run import FILL
 from sandmould.kinds.kind import AnyScenario, SpeedClass
+from sandmould.kinds.stored_speed import StoredSpeed
 from sandmould.runs.progress import duration_text
 from sandmould.runs.words import say
 from sandmould.study.plan.batches import Batch, mark_done
@@ -145,14 +146,8 @@ def measure_speeds(plan: Plan, results: Path) -> None:
     speed = plan.kind.planning.speed
     if speed is None or not may_run(plan.study, plan.runs):
         return
-    slow = sum(
-        any(speed.stored(scenario) is None for scenario in alike) for alike in plan.classes.values()
-    )
-    if slow:
-        say(
-            f"Measuring the speed of this machine, once: about {slow * MEASURING_S:g} s, and up "
-            "to 2 min where code is compiled first."
-        )
+    if to_measure := _to_measure(plan, speed):
+        say(to_measure)
     failures = dict[str, Problem]()
     runs_somewhere = False
     tried: list[AnyScenario] = []
@@ -169,3 +164,22 @@ def measure_speeds(plan: Plan, results: Path) -> None:
         raise BadInputError(list(failures.values())[:1])
     for said in failures:
         say(said)
+
+
+def _to_measure(plan: Plan, speed: StoredSpeed[AnyScenario]) -> str:
+    """Say what is not known yet and how long finding it out takes; empty where all is known."""
+    unknown = [[s for s in alike if speed.stored(s) is None] for alike in plan.classes.values()]
+    program = plan.kind.planning.program
+    if program is not None:
+        # one of several ranks has no pilot
+        alone = [s for s in chain.from_iterable(unknown) if plan.kind.planning.ranks(s) == 1]
+        decks = [s for n, s in enumerate(alone) if s not in alone[:n]]
+        names = {next(iter(program.files(s).values())).name for s in decks}
+        times = f" at {len(decks)} points, each" if len(decks) > 1 else ""
+        return f"Trying {', '.join(sorted(names))}{times} for some seconds." if decks else ""
+    if not (slow := sum(map(bool, unknown))):
+        return ""
+    return (
+        f"Measuring the speed of this machine, once: about {slow * MEASURING_S:g} s, and up "
+        "to 2 min where code is compiled first."
+    )

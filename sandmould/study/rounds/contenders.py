@@ -27,7 +27,8 @@ class Contenders:
     def half_width(self) -> float:
         """Of the 95 % interval of the difference between the two best settings."""
         low, high = self.verdict.ci
-        return (high - low) / 2.0
+        second = self.verdict.runner_up
+        return (high - low) / 2.0 * (second.mean if self.verdict.by_factor and second else 1.0)
 
     def more(self, runs: int) -> tuple[tuple[Point, int], ...]:
         """Bring the contenders to equally many replicates; where they are, to one more.

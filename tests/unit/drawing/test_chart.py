@@ -171,7 +171,7 @@ def test_logarithmic_axes_have_decades_of_one_length(drawing: tuple[int, int]) -
     marks = tuple(Mark(x, y, "mean", label=f"{x:g}") for x, y in ((1, 0.01), (10, 1), (100, 100)))
     none = Mark(10.0, 0.0, "mean")
     laid = lay_out(
-        Chart("time, s", "error, %", "alt", marks=(*marks, none), is_logarithmic=True), drawing
+        Chart("time, s", "error, %", "alt", marks=(*marks, none), log_x=True, log_y=True), drawing
     )
     assert [mark.mark for mark in laid.marks] == list(marks)
     for places in ([m.x for m in laid.marks], [m.y for m in laid.marks]):
@@ -183,7 +183,19 @@ def test_logarithmic_axes_have_decades_of_one_length(drawing: tuple[int, int]) -
 
 
 def test_one_value_on_logarithmic_axes_has_ticks_beside_it() -> None:
-    one = Chart("x", "y", "alt", marks=(Mark(0.2, 3e-4, "mean"),), is_logarithmic=True)
+    one = Chart("x", "y", "alt", marks=(Mark(0.2, 3e-4, "mean"),), log_x=True, log_y=True)
     laid = lay_out(one, WIDE)
     assert laid.x.low < 0.2 < laid.x.high
     assert laid.y_ticks or laid.x_ticks
+
+
+def test_what_reaches_to_zero_ends_at_the_foot_of_a_logarithmic_axis() -> None:
+    rising = Line(np.array([[0.0, 0.0], [1.0, 1e-4], [2.0, 10.0]]))
+    mean = Mark(2.0, 0.1, "mean", half_width=0.2)
+    laid = lay_out(Chart("time, s", "energy, J", "alt", (rising,), (mean,), log_y=True), WIDE)
+    interval = laid.marks[0].interval
+    assert interval is not None
+    assert interval[1] == laid.y.start
+    assert laid.lines[0].path.endswith(f"{laid.lines[0].end[1]:.1f}")
+    assert "nan" not in laid.lines[0].path
+    assert not laid.x.is_logarithmic

@@ -356,6 +356,27 @@ def test_a_deck_that_goes_on_too_far_has_failed(tmp_path: Path) -> None:
             )
 
 
+def test_what_a_killed_attempt_took_counts(tmp_path: Path) -> None:
+    run = expand(open_study(opened(tmp_path, ONE_GRAIN, steps=100)))[-1]
+    folder = tmp_path / "runs" / run.run
+    first = DECK.execution.compute(run, folder).cost
+    assert first.steps == 100
+    # killed near its end: the log breaks off, and restart.a holds step 90
+    log = folder / "work" / "engine_1.log"
+    log.write_text(log.read_text().partition("Loop time")[0])
+    (folder / "work" / "restart.b").unlink()
+    second = DECK.execution.compute(run, folder)
+    assert second.outcome.outcome is Outcome.FINISHED
+    assert second.cost.steps == 110
+    assert second.cost.cpu_s > first.cpu_s
+    assert second.cost.wall_s > first.wall_s
+    # what began anew is judged by its own steps
+    for restart in (folder / "work").glob("restart.*"):
+        restart.unlink()
+    third = DECK.execution.compute(run, folder)
+    assert (third.outcome.outcome, third.cost.steps) == (Outcome.FINISHED, 210)
+
+
 def test_a_deck_that_ends_elsewhere_has_failed(tmp_path: Path) -> None:
     anew = ONE_GRAIN + "reset_timestep 0\nrun 50\n"
     for text, steps, said in (

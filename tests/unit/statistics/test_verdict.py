@@ -320,3 +320,20 @@ def test_means_are_tested_as_scipy_tests_them(paired: bool) -> None:
     assert is_paired is paired
     assert (test.pvalue, test.df) == pytest.approx((result.pvalue, result.df))
     assert test.confidence_interval(0.9) == pytest.approx(result.confidence_interval(0.9))
+
+
+def test_values_far_apart_are_compared_by_their_logarithms() -> None:
+    energies_j = {5.0: (1.0, 1.2, 0.9), 10.0: (6.0, 7.5, 7.0), 20.0: (4e5, 6e5, 5e5)}
+    summary = table(energies_j).rename(columns={FILL: "kinetic_j"})
+    verdict = compare_settings(summary, [KEY], "kinetic_j")
+    assert verdict.by_factor
+    assert verdict.resolved
+    mean = {at: np.exp(np.mean(np.log(own))) for at, own in energies_j.items()}
+    factors = [c.difference for c in verdict.comparisons]
+    assert factors == pytest.approx([mean[20.0] / mean[10.0], mean[20.0] / mean[5.0]])
+    assert all(c.ci[0] < c.difference < c.ci[1] for c in verdict.comparisons)
+    # a share, a value at zero and one run each are told as they are
+    assert not compare_settings(table({5.0: (1e-4, 2e-4), 9.0: (0.5, 0.6)}), [KEY], FILL).is_wide
+    for values in ({5.0: (0.0, 1.0), 9.0: (900.0, 990.0)}, {5.0: (1.0,), 9.0: (900.0,)}):
+        of = table(values).rename(columns={FILL: "kinetic_j"})
+        assert not compare_settings(of, [KEY], "kinetic_j").by_factor

@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import contextlib
 import ctypes
+import json
 import math
 import shutil
 import threading
@@ -17,6 +19,8 @@ from sandmould.kinds.deck.own.columns import missing_columns
 from sandmould.kinds.deck.own.deck import OUTPUT, RESTART_FILES, check_unchanged, names_used, render
 from sandmould.kinds.deck.own.measures import missing_dump
 from sandmould.kinds.deck.own.thermo import LOGGED, STEP, Thermo, read_thermo
+from sandmould.plain_file import UNREADABLE, read_json
+from sandmould.runs.files import write_text
 from sandmould.runs.outcome import Outcome, RunOutcome
 from sandmould.runs.products import Computed, Cost, cpu_time_s, peak_memory_bytes
 from sandmould.runs.progress import LINE_EVERY_S, Progress
@@ -25,6 +29,8 @@ from sandmould.scenario.own_deck import CLOCK, OwnDeck
 FLUSH_EVERY_S = 0.5
 """What a killed run can lose of its log."""
 _DECK = "deck.in"
+_SPENT = "spent.json"
+"""In ``work``: wall and processor time of all attempts at a run."""
 WENT_ON = "gone on from"
 """How the outcome of a run that was killed begins to say where it was taken up again."""
 
@@ -52,7 +58,7 @@ def compute(scenario: OwnDeck, folder: Path, run: str, study: str) -> Computed:
     if world is not None:
         candidates = world.bcast(candidates)
     check_unchanged(scenario, is_rendered=not candidates)
-    begun, cpu_begun = time.monotonic(), cpu_time_s()
+    spent = _Spent(work / _SPENT)
     cost = Cost(scenario.engine.name, scenario.engine.ranks, math.nan, math.nan)
     notes: list[str] = []
     outcome, detail = Outcome.FINISHED, ""
@@ -67,7 +73,9 @@ def compute(scenario: OwnDeck, folder: Path, run: str, study: str) -> Computed:
             _lay_out(scenario, output, deck, bool(restart))
         if world is not None:
             world.barrier()
-        watch = _Watch(log, Progress(run, work, scenario.steps, "steps"), is_root)
+        progress = Progress(run, work, scenario.steps, "steps")
+        progress.earlier_cpu_s = spent.earlier_cpu_s
+        watch = _Watch(log, progress, spent, is_root)
         try:
             with watch:
                 reader.read_deck(output, _DECK, log)
@@ -86,14 +94,14 @@ def compute(scenario: OwnDeck, folder: Path, run: str, study: str) -> Computed:
     if outcome is Outcome.FINISHED:
         missing = missing_columns(scenario, [str(column) for column in thermo.table])
         missing = missing or missing_dump(scenario, output)
-        if said := missing or _wrong_end(scenario, thermo, bool(restart)):
+        if said := missing or _wrong_end(scenario, read_thermo([log]), bool(restart)):
             outcome, detail = Outcome.BAD_INPUT, said
     cost.version = str(engine.installed_version())
     cost.grains = thermo.grains
     cost.steps, cost.grain_steps, cost.engine_wall_s = (
         thermo.steps, thermo.grain_steps, thermo.loop_s
     )  # fmt: skip
-    cost.wall_s, cost.cpu_s = time.monotonic() - begun, cpu_time_s() - cpu_begun
+    cost.wall_s, cost.cpu_s = spent.now_s()
     cost.peak_memory_bytes = peak_memory_bytes()
     cost.largest_overlap_fraction = math.nan
     last_s = float(thermo.table[CLOCK].iloc[-1]) if CLOCK in thermo.table else 0.0
@@ -106,6 +114,8 @@ def _wrong_end(scenario: OwnDeck, thermo: Thermo, went_on: bool) -> str:
 
     A deck may count its steps anew on the way: unless it went on from a restart file, those of
     all its runs together may be the stated ones instead.
+
+    ``thermo``: of the last attempt.
     """
     if scenario.steps is None or thermo.table.empty:
         return ""
@@ -155,11 +165,34 @@ def _end_log(log: Path, said: str) -> None:
         log.write_text(f"{text}\n{said}\n".lstrip(), encoding="utf-8")
 
 
+class _Spent:
+    """What a run has taken, with the attempts at it that were killed."""
+
+    def __init__(self, path: Path) -> None:
+        self._path = path
+        self._begun_s, self._cpu_begun_s = time.monotonic(), cpu_time_s()
+        self._earlier_s = self.earlier_cpu_s = 0.0
+        with contextlib.suppress(*UNREADABLE):
+            before = read_json(path)
+            self._earlier_s, self.earlier_cpu_s = float(before["wall_s"]), float(before["cpu_s"])
+
+    def now_s(self) -> tuple[float, float]:
+        """Wall and processor time of all attempts."""
+        wall_s = self._earlier_s + time.monotonic() - self._begun_s
+        return wall_s, self.earlier_cpu_s + cpu_time_s() - self._cpu_begun_s
+
+    def note(self) -> None:
+        """Write it down for the next attempt."""
+        with contextlib.suppress(OSError):
+            text = json.dumps(dict(zip(("wall_s", "cpu_s"), self.now_s(), strict=True)))
+            write_text(self._path, text)
+
+
 class _Watch:
     """Has a log written out while the engine fills it, and shows how far it has come."""
 
-    def __init__(self, log: Path, progress: Progress, is_root: bool) -> None:
-        self._log, self._progress, self._is_root = log, progress, is_root
+    def __init__(self, log: Path, progress: Progress, spent: _Spent, is_root: bool) -> None:
+        self._log, self._progress, self._spent, self._is_root = log, progress, spent, is_root
         self._over = threading.Event()
         self._thread = threading.Thread(target=self._look, daemon=True)
 
@@ -172,6 +205,7 @@ class _Watch:
         self._over.set()
         if self._is_root:
             self._thread.join()
+            self._spent.note()
 
     def _look(self) -> None:
         first: float | None = None
@@ -179,6 +213,7 @@ class _Watch:
         libc = ctypes.CDLL(None)
         while not self._over.wait(FLUSH_EVERY_S):
             libc.fflush(None)  # LAMMPS keeps some kilobytes of its log to itself
+            self._spent.note()
             if time.monotonic() - last_line < LINE_EVERY_S or not self._log.exists():
                 continue
             last_line = time.monotonic()

@@ -27,11 +27,12 @@ class Thermo:
     grains: int
     """At the end of the last ``run``."""
     steps: int
-    """Of all runs, those that were done again included."""
+    """Of all runs, those that were done again included, and one that was cut short as far as it is
+    logged."""
     grain_steps: float
-    """Steps of each ``run`` times grains at its end."""
+    """Steps of each ``run`` that ended, times grains at its end."""
     loop_s: float
-    """Wall time of all runs."""
+    """Wall time of all these."""
 
 
 def read_thermo(logs: Sequence[Path]) -> Thermo:
@@ -46,13 +47,18 @@ def read_thermo(logs: Sequence[Path]) -> Thermo:
     every_step = last_grains = 0
     for log in logs:
         text = log.read_text(encoding="utf-8", errors="replace")
-        for loop, steps, grains in _LOOP.findall(text):
+        ended = 0
+        for found in _LOOP.finditer(text):
+            loop, steps, grains = found.groups()
             loop_s += float(loop)
             grain_steps += float(steps) * float(grains)
             every_step, last_grains = every_step + int(steps), int(grains)
+            ended = found.end()
         table = pd.DataFrame(list(_rows(text)))
         if table.empty:
             continue
+        if cut_short := [row[STEP] for row in _rows(text[ended:])]:
+            every_step += int(cut_short[-1] - cut_short[0])
         together = together[together[STEP] < table[STEP].iloc[0]]
         together = table if together.empty else pd.concat([together, table], ignore_index=True)
     return Thermo(together, last_grains, every_step, grain_steps, loop_s)
