@@ -102,7 +102,7 @@ def _advance(
     ``place`` is its displacement: the first two are given, the others are found.
     """
     done, state = steps, DONE
-    one = np.int64(1)  # for a literal numba would compile it once more
+    one = int(np.int64(1))  # for a literal numba would compile it once more
     for k in range(steps):
         if thread == 0 and not drifted:
             sand = sand_force(dim, moving.grains.force, scene.direction)

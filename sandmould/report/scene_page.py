@@ -25,7 +25,7 @@ from sandmould.drawing.sphere_film import SphereFilm, bare_film, sphere_frames
 from sandmould.drawing.sphere_scene import solid_scene, sphere_scene
 from sandmould.drawing.templates import page_environment
 from sandmould.engines.snapshot import Snapshot
-from sandmould.report.kinds.cast_fields import distance_from
+from sandmould.report.cast_fields import distance_from
 from sandmould.runs.files import replaced
 from sandmould.runs.formatting import listed
 from sandmould.runs.templates import Note, notes

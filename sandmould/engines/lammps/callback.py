@@ -221,7 +221,7 @@ def _press(dim: Any, bridge: Bridge, step: int, ids: Any, position: Floats, adde
     _clear(bridge.step_loads)
     surface_forces(
         dim,
-        np.int64(0),  # for a literal numba would compile it once more
+        int(np.int64(0)),  # for a literal numba would compile it once more
         counts[ROWS],
         Candidates(bridge.rows, bridge.start, part),
         position,

@@ -71,7 +71,7 @@ def _advance(
     """See ``steps.advance``, which computes every step; the mover comes before each."""
     walls = moving.walls
     done, state = steps, DONE
-    one = np.int64(1)  # for a literal numba would compile it once more
+    one = int(np.int64(1))  # for a literal numba would compile it once more
     for k in range(steps):
         if thread == 0 and not drifted:
             _set_motion(walls, mover, first_step + k)

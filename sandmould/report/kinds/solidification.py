@@ -17,8 +17,8 @@ from sandmould.drawing.chart import PLAIN, Chart, Line, Mark, tints
 from sandmould.drawing.figure_files import numbered, pictures
 from sandmould.drawing.sphere_film import bare_film
 from sandmould.kinds.solidification.kind import SolidificationStudy
-from sandmould.report.kinds.cast_fields import cast_fields, cast_scene
-from sandmould.report.kinds.kind import Findings, KindPages, KindReport
+from sandmould.report.cast_fields import cast_fields, cast_scene
+from sandmould.report.kinds.kind import Findings, FirstPicture, KindPages, KindReport
 from sandmould.report.tables import Cell, Column, Table
 from sandmould.report.time_series import curve_figures, measure_curves
 from sandmould.runs.columns import CPU_S, RUN, SOLIDIFICATION_TIME_S, TIME_S, finished
@@ -98,7 +98,7 @@ def _pages(findings: Findings[Solidification], film_budget_bytes: int) -> KindPa
             **numbered("error_cost", error_cost),
             **curve_figures([*([cooling] if cooling else []), *curves]),
         },
-        picture=first,
+        picture=FirstPicture(*first) if first[0] else None,
         findings=said[2:] if is_one else said,
         answer=_of_one(findings, said[:2]) if is_one else cheapest,
         grounds=notes(

@@ -24,7 +24,6 @@ from sandmould.analysis.freezing_plots import (
 from sandmould.casting.arpm.scene import solids_of
 from sandmould.drawing.figures import png
 from sandmould.drawing.sphere_scene import SurfaceField, solid_scene
-from sandmould.report.kinds.kind import FirstPicture
 from sandmould.report.tables import Cell, Column, Table
 from sandmould.runs.formatting import number
 from sandmould.runs.templates import sentences
@@ -45,7 +44,8 @@ class CastFields(NamedTuple):
     """What is shown of a run's fields, and what they say."""
 
     pictures: str = ""
-    first: FirstPicture | None = None
+    first: tuple[str, str, str] = ("", "", "")
+    """Address, alternative text and caption of the first picture; empty without fields."""
     said: tuple[str, ...] = ("No run has left fields.",)
     tables: tuple[Table, ...] = ()
     fed: Feeding | None = None
@@ -83,7 +83,7 @@ def cast_fields(folder: Path, scenario: Solidification) -> CastFields:
     dashed = "; dashed: risers" if risers else ""
     caption = f"When each part of the casting froze, and the part as drawn (line{dashed})"
     where = ", cut through the last point to freeze" if scenario.dimensions == 3 else ""
-    first = FirstPicture(png(alone, has_scales=True), alt, f"{caption}{where}.")
+    first = png(alone, has_scales=True), alt, f"{caption}{where}."
     part = _of_part(fields, scenario)
     above_m = _above_risers_m(fields) if risers else 0.0
     like = _like_the_largest(fed.cut_off) if fed and fed.cut_off else 0
