@@ -13,7 +13,9 @@ import pytest
 from sandmould import SHIPPED
 from sandmould.arrays import Floats
 from sandmould.casting.arpm import scene
+from sandmould.casting.arpm.cut import with_cut
 from sandmould.casting.arpm.elements import placed
+from sandmould.casting.arpm.faces import face_exchange
 from sandmould.casting.arpm.filling import Filling
 from sandmould.casting.arpm.material import ThermalMaterial
 from sandmould.casting.arpm.method import HeatMethod
@@ -21,6 +23,7 @@ from sandmould.casting.arpm.raster import Raster, painted
 from sandmould.casting.arpm.solidification import Cooling, SolidificationResult, solidify
 from sandmould.casting.arpm.varying import Transfer
 from sandmould.geometry.geometry import Block
+from sandmould.geometry.outline import Outline
 from sandmould.scenario.casting.curves import packed_over_gas, packed_w_m_k, solid_fractions
 from sandmould.scenario.casting.solidification import Solidification
 from sandmould.scenario.reading import Origin, merge, read_yaml, validated
@@ -163,6 +166,28 @@ def test_faces_of_two_sizes_follow_curves_too() -> None:
     assert np.abs(found[1].drift_percent).max() < 1e-9
     # of larger elements away from the surface; 0.06 % measured
     assert found[1].solidification_time_s == pytest.approx(found[0].solidification_time_s, rel=3e-3)
+
+
+@pytest.mark.parametrize("layers", [(), (1,)])
+def test_curves_at_one_temperature_are_their_numbers_there(layers: tuple[int, ...]) -> None:
+    angle = np.radians(20.0 + 90.0 * np.arange(4))
+    body = Outline("bar", 0.01 * np.stack([np.cos(angle), np.sin(angle)], axis=1))
+    half = np.full(2, 0.02)
+    elements = placed(with_cut(painted(-half, half, 0.00125, {1: body}), [body]), layers)
+    curve = Transfer(((300.0, 500.0), (1000.0, 900.0)))
+    filling = Filling((DIE, ALLOY), (450.0, 960.0), transfers={(0, 1): curve})
+    found = HeatMethod("faces").exchange_of(elements, filling)
+    assert found.varying is not None
+    everywhere = np.full(len(elements.size_m), 700.0)
+    metal_k, die_k = k_of_metal(everywhere[:1])[0], 45.0 - 17.0 * 400.0 / 600.0
+    resistance = 1.0 / (500.0 + 400.0 * 400.0 / 700.0)
+    exact = face_exchange(elements, np.array([die_k, metal_k]), resistance).rate_w_m3_k
+    rate = np.empty(len(exact))
+    entry = np.arange(len(exact))
+    own = found.varying.sorted(np.arange(len(everywhere)), elements.material, entry)
+    own.find_rates(everywhere, 0.0, rate)
+    # straight lines between the places of a table
+    np.testing.assert_allclose(rate, exact, rtol=1e-5, atol=1e-9 * exact.max())
 
 
 def test_a_curve_that_is_flat_is_a_number() -> None:

@@ -25,7 +25,7 @@ from sandmould.casting.arpm.marching import (
     note,
 )
 from sandmould.casting.arpm.material import temperature_of
-from sandmould.casting.arpm.varying import VaryingFaces
+from sandmould.casting.arpm.varying import VaryingFaces, changed
 from sandmould.compiled import njit
 
 MOST_LEVELS = 8
@@ -74,7 +74,9 @@ class LocalSteps:
         level = np.minimum(octave.astype(np.int64), most_levels - 1)
         self._threads = threads
         self._varying: VaryingFaces | None = None
-        self._rated_k, self._changed_k = np.empty(0), math.inf
+        # as the heat has it, and in the order of levels
+        self._rated_k = self._now_rated_k = np.empty(0)
+        self._changed_k = math.inf
         self._order = np.argsort(level, kind="stable")
         self._sort(exchange, substance, level[self._order])
         self.volume_m3 = exchange.volume_m3
@@ -121,17 +123,20 @@ class LocalSteps:
         )
         set_num_threads(self._threads)
         dt = duration_s / (cycles * substeps)
-        some = max(1, LOOKED_AT // substeps)
-        for begin in range(0, cycles, cycles if self._varying is None else some):
-            end_of = cycles if self._varying is None else min(begin + some, cycles)
+        integral, new = np.zeros((len(enthalpy), count)), np.empty(len(enthalpy))
+        some = cycles if self._varying is None else max(1, LOOKED_AT // substeps)
+        for begin in range(0, cycles, some):
+            end_of = min(begin + some, cycles)
             self._follow(heat, temperature, heat.time_s + 0.5 * (begin + end_of) * substeps * dt)
             _local_steps(
                 begin * substeps, end_of * substeps, dt, heat.time_s, levels, self._system,
-                enthalpy, temperature, noted,
+                integral, enthalpy, temperature, noted, new,
             )  # fmt: skip
         heat.enthalpy_j_m3[self._order] = enthalpy
         heat.temperature_k[self._order] = temperature
         heat.noted[:, self._order] = noted
+        if self._varying is not None:
+            heat.rated_k[self._order] = self._now_rated_k
         heat.time_s += duration_s
         of_level = np.diff(np.concatenate([[0], end]))
         heat.element_steps += cycles * int((of_level * 2 ** np.arange(top, -1, -1)).sum())
@@ -140,15 +145,15 @@ class LocalSteps:
         """Find conductances anew where what they follow has changed; it may be another state's."""
         if self._varying is None:
             return
-        rated_k = heat.rated_k[self._order]
-        change_k = np.abs(temperature_k - rated_k).max()
-        if self._varying.over_time or not change_k < self._changed_k:
-            rated_k, heat.rated_k = temperature_k, np.empty_like(rated_k)
-            heat.rated_k[self._order] = rated_k
-        elif heat.rated_k is self._rated_k:
+        is_known = heat.rated_k is self._rated_k
+        if not is_known:
+            self._rated_k, self._now_rated_k = heat.rated_k, heat.rated_k[self._order]
+        if self._varying.over_time or changed(temperature_k, self._now_rated_k, self._changed_k):
+            self._now_rated_k[:] = temperature_k
+            self._rated_k = heat.rated_k = np.empty_like(temperature_k)
+        elif is_known:
             return
-        self._rated_k = heat.rated_k
-        self._system.rate[:] = self._varying.rates_w_m3_k(rated_k, middle_s)
+        self._varying.find_rates(self._now_rated_k, middle_s, self._system.rate)
 
 
 @njit(parallel=True)
@@ -207,11 +212,13 @@ def _integrate(
 @njit()
 def _local_steps(
     begin: int, stop: int, dt: float, time_s: float, levels: Levels, system: HeatSystem,
-    enthalpy: Floats, temperature: Floats, noted: Floats,
+    integral: Floats, enthalpy: Floats, temperature: Floats, noted: Floats, new: Floats,
 ) -> None:  # fmt: skip
-    """Take the shortest steps from one to another, both ends of cycles of 2^(levels - 1)."""
+    """Take the shortest steps from one to another, both ends of cycles of 2^(levels - 1).
+
+    There all integrals are 0.
+    """
     end = levels.end
-    integral, new = np.zeros((len(enthalpy), len(end))), np.empty(len(enthalpy))
     for at in range(begin + 1, stop + 1):
         highest = 0
         while highest < len(end) - 1 and at % (1 << (highest + 1)) == 0:

@@ -142,8 +142,8 @@ class EnthalpyTable:
     rows: Floats
     """(m, 6) float64: J/m3/K; enthalpies of solidus and liquidus, J/m3; solidus and liquidus, K;
     enthalpy at which gradients are read, J/m3. Where a material has curves all rows go on: number
-    of the node at no enthalpy, nodes for a J/m3; of the straight lines that begin at each node the
-    temperature at no enthalpy, K, and the slope, K m3/J."""
+    of the node at no enthalpy, nodes for a J/m3; of the straight line that begins at each node the
+    temperature at no enthalpy, K, and the slope, K m3/J, side by side."""
 
     def enthalpy_j_m3(self, temperature_k: Floats, material: Ints) -> Floats:
         """Enthalpy of elements; one on an isothermal front (solidus = liquidus) is liquid.
@@ -162,7 +162,7 @@ class EnthalpyTable:
             for m in np.unique(material):
                 own, (shift, density) = material == m, self.rows[m, HEAD : HEAD + 2]
                 heat = (np.arange(NODES) - shift) / density
-                at_0_k, slope = self.rows[m, HEAD + 2 :].reshape(2, NODES)
+                at_0_k, slope = self.rows[m, HEAD + 2 :].reshape(NODES, 2).T
                 found[own] = np.interp(temperature_k[own], at_0_k + slope * heat, heat)
             return found
         capacity, solid, liquid, solidus, liquidus = self.rows[material, :5].T
@@ -256,7 +256,8 @@ def _curves(it: ThermalMaterial, reference_k: float, hottest_k: float) -> Floats
     slope[-1] = slope[-2]
     head = [least, solidus, liquidus, it.solidus_k, it.liquidus_k, math.nan]
     numbers = [-heat[0] * per_node, per_node]
-    return np.concatenate([head, numbers, node_k - slope * nodes, slope])
+    lines = np.stack([node_k - slope * nodes, slope], axis=1)
+    return np.concatenate([head, numbers, lines.reshape(-1)])
 
 
 @njit(inline="always")
@@ -265,7 +266,8 @@ def temperature_of(enthalpy: float, m: int, rows: Any, reference: float) -> Any:
     if rows.shape[1] > HEAD:
         # whole numbers are bounded in less time
         node = min(max(int(enthalpy * rows[m, HEAD + 1] + rows[m, HEAD]), 0), NODES - 2)
-        return rows[m, HEAD + 2 + node] + rows[m, HEAD + 2 + NODES + node] * enthalpy
+        at = HEAD + 2 + 2 * node
+        return rows[m, at] + rows[m, at + 1] * enthalpy
     if enthalpy < rows[m, 1]:
         return reference + enthalpy / rows[m, 0]
     if enthalpy < rows[m, 2]:
