@@ -278,7 +278,8 @@ def test_walls_that_meet_freeze_alike_at_any_angle(name: str, degrees: float) ->
     # 0.30 % measured with 8 elements a wall, 2.6 % where steps hinder heat along the surface
     assert abs(off[1]) < 0.01
     assert abs(walls_frozen_s(name, degrees, 8) / upright - 1) < 0.01
-    # 2.9 % measured for the L at 7 degrees, 1.6 % upright: no slower from there than upright
+    # 2.9 % measured for the L at 7 degrees, 1.6 % upright; with 8 all turned ones are nearer than
+    # upright, with 16 some keep 0.2 % where upright has 0.1 %
     assert abs(off[0]) < 0.035
     assert walls_frozen_s(name, degrees, 8, "difference") == pytest.approx(
         walls_frozen_s(name, degrees, 8), rel=2e-3
