@@ -30,20 +30,21 @@ def draw_loose_field(
     Parameters
     ----------
     field : LooseField
-        In three dimensions.
     zones : sequence of int
         Those that are outlined, as seen along y, and numbered from 1: in full where the plane cuts
         them, else dashed.
     """
-    plane_m = cut_m(scenario) or 0.0
-    shape = field.share.shape
-    row = int(np.clip(round((plane_m - field.low_m[1]) / field.cell_m), 0, shape[1] - 1))
-    x, z = (_MM * (field.low_m[k] + field.cell_m * np.arange(shape[k])) for k in (0, 2))
+    # a plane is cut as a slice of one row
+    share, of_zone = (a if a.ndim == 3 else a[:, None] for a in (field.share, field.zone))
+    low_m = field.low_m if field.share.ndim == 3 else np.insert(field.low_m, 1, 0.0)
+    shape, plane_m = share.shape, cut_m(scenario) or 0.0
+    row = int(np.clip(round((plane_m - low_m[1]) / field.cell_m), 0, shape[1] - 1))
+    x, z = (_MM * (low_m[k] + field.cell_m * np.arange(shape[k])) for k in (0, 2))
     half = 0.5 * _MM * field.cell_m
 
     def draw(ax: Axes, _: Snapshot) -> None:
         ax.imshow(
-            field.share[:, row].T,
+            share[:, row].T,
             origin="lower",
             extent=(x[0] - half, x[-1] + half, z[0] - half, z[-1] + half),
             cmap=COLOURS,
@@ -52,7 +53,7 @@ def draw_loose_field(
             interpolation="bilinear",
         )
         for place, zone in enumerate(zones, start=1):
-            own = field.zone == zone
+            own = of_zone == zone
             seen = np.pad(own.any(axis=1), 1)
             style = "solid" if own[:, row].any() else "dashed"
             beside = (np.pad(ends, 1, "reflect", reflect_type="odd") for ends in (x, z))

@@ -1,4 +1,4 @@
-"""What the report says of loose sand round the obstacles of a 3D scene."""
+"""What the report says of loose sand round the obstacles of a scene."""
 
 from __future__ import annotations
 
@@ -7,7 +7,7 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from sandmould.kinds.sand.measures import seeks_loose_sand
+from sandmould.engines.snapshot import scene_at
 from sandmould.kinds.sand.moments import list_moments
 from sandmould.report.tables import Cell, Column, Table
 from sandmould.runs.formatting import number
@@ -18,6 +18,8 @@ if TYPE_CHECKING:
     from sandmould.analysis.loose_zones import LooseZone
 
 _LISTED = 8
+_MM = {2: 1e6, 3: 1e9}
+"""mm2 or mm3."""
 _SIDES = {"under": "straight under", "over": "straight over", "beside": "beside"}
 
 
@@ -28,26 +30,27 @@ def loose_sand_pages(
 
     ``scenario``: its grains are the measure of a zone.
     """
-    if not run or not seeks_loose_sand(scenario):
+    if not run or not scenario.scene.solids or scenario.gate is not None:
         return None
-    from sandmould.analysis.loose_zones import LOOSE
+    from sandmould.analysis.loose_zones import BALL_GRAINS, LOOSE, find_loose_sand
     from sandmould.drawing.loose_field import (  # scipy: few need it
         LEAST,
         MOST,
         draw_loose_field,
         on_surfaces,
     )
-    from sandmould.kinds.sand.loose import last_loose_sand
 
-    loose = last_loose_sand(scenario, folder / "runs" / run)
-    if loose is None:
+    moments = list_moments(folder / "runs" / run)
+    if not moments:
         return None
+    last, grain_m = moments[-1].load(), scenario.sand.mass_median_diameter_m
+    loose = find_loose_sand(last.position_m, last.radius_m, scene_at(scenario, last), grain_m)
     # where nothing is near, a zone is as large as chance and corners make it
-    far_m3 = max((zone.measure for zone in loose.zones if zone.side == "away"), default=0.0)
+    far = max((zone.measure for zone in loose.zones if zone.side == "away"), default=0.0)
     numbers = [
         place
         for place, zone in enumerate(loose.zones, start=1)
-        if zone.side != "away" and zone.measure > far_m3
+        if zone.side != "away" and zone.measure > far
     ][:_LISTED]
     said = sentences(
         "loose.j2",
@@ -57,26 +60,30 @@ def loose_sand_pages(
             if side in _SIDES and math.isfinite(share)
         ],
         far=loose.side_fraction["away"],
-        far_m3=far_m3,
+        far_mm=_MM[scenario.dimension] * far,
+        unit="mm²" if scenario.dimension == 2 else "mm³",
         listed_zones=len(numbers),
         more=len(loose.zones) - len(numbers),
     )
-    last = list_moments(folder / "runs" / run)[-1].load()
     return {
         "sentences": said,
         "picture": draw_loose_field(loose.field, numbers, last, scenario, height_m),
-        "surface": on_surfaces(loose.field),
+        "surface": on_surfaces(loose.field) if scenario.dimension == 3 else None,
         "ends": (LEAST, MOST),
         "loose": LOOSE,
+        "reach_mm": 1e3 * 0.5 * BALL_GRAINS * grain_m,
         "table": _table([loose.zones[place - 1] for place in numbers], scenario),
     }
 
 
 def _table(zones: Sequence[LooseZone], scenario: Scenario) -> Table:
-    grain_m3 = math.pi / 6 * scenario.sand.mass_median_diameter_m**3
+    flat, grain_m = scenario.dimension == 2, scenario.sand.mass_median_diameter_m
+    grain = math.pi * (grain_m**2 / 4 if flat else grain_m**3 / 6)
+    size, unit = ("area", "mm²") if flat else ("volume", "mm³")
     columns = (
-        Column("no."), Column("where", False), Column("x, mm"), Column("y, mm"), Column("z, mm"),
-        Column("volume, mm³"), Column("volume of grains"), Column("solid fraction"),
+        Column("no."), Column("where", False), Column("x, mm"), Column("y, mm"),
+        *(() if flat else (Column("z, mm"),)),
+        Column(f"{size}, {unit}"), Column(f"{size} over a grain's"), Column("solid fraction"),
     )  # fmt: skip
     rows = []
     for place, zone in enumerate(zones, start=1):
@@ -84,6 +91,6 @@ def _table(zones: Sequence[LooseZone], scenario: Scenario) -> Table:
         cells = [Cell(str(place), str(place)), Cell(where, where)]
         for low, high in zip(1e3 * zone.low_m, 1e3 * zone.high_m, strict=True):
             cells.append(Cell(f"{low:.0f} to {high:.0f}", str(low)))
-        values = (1e9 * zone.measure, zone.measure / grain_m3, zone.solid_fraction)
+        values = (_MM[scenario.dimension] * zone.measure, zone.measure / grain, zone.solid_fraction)
         rows.append((*cells, *(Cell(number(value, 3), str(value)) for value in values)))
     return Table(columns, tuple(rows), (False,) * len(rows))

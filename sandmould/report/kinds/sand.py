@@ -66,7 +66,7 @@ def _pages(findings: Findings[Scenario], film_budget_bytes: int) -> KindPages:
 
         bending = bending_pages(folder, href, scenario, of_sweep, verdict, run)
     loose = loose_sand_pages(folder, run, scenario, pages["height_m"])
-    surfaces = [loose["surface"]] if loose else []
+    surfaces = [loose["surface"]] if loose and loose["surface"] else []
     best = verdict.best.label if verdict.best else ""
     grain_size = grain_size_pages(study, collected, scenario, best) if verdict.best else None
     pages["film_scene"] = film_scene(scenario, pages["height_m"], surfaces)

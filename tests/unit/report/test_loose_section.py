@@ -88,7 +88,30 @@ def test_a_hollow_under_a_plate_is_measured_and_told(folder: Path) -> None:
     )
 
 
-def test_none_is_sought_in_2d_without_obstacles_or_through_a_gate(folder: Path) -> None:
+def test_a_hollow_is_told_in_2d_too(tmp_path: Path) -> None:
+    axes = [GRAIN_M * (np.arange(n) + 0.5) for n in (14, 16)]
+    places = np.stack(np.meshgrid(*axes, indexing="ij"), axis=-1).reshape(-1, 2)
+    for middle, half in (([7.0, 9.0], [3.0, 1.0]), ([7.0, 6.5], [3.0, 1.5])):
+        apart = np.abs(places / GRAIN_M - middle) > np.array(half) + 0.01
+        places = places[apart.any(axis=1)]
+    ids, none = np.arange(1, len(places) + 1), np.zeros_like(places)
+    spin, radius = np.zeros(len(places)), np.full(len(places), GRAIN_M / 2)
+    still = Snapshot(0.1, np.nan, "settle_1", ids, np.ones_like(ids), places, none, spin, radius)
+    write_snapshots(tmp_path / "runs" / "one", [still])
+    plate = PLATE | {"centre_m": [0.007, 0.009], "size_m": [0.006, 0.002]}
+    own = scene(dimension=2, box={"width_m": 0.014, "height_m": 0.02}, obstacles=[plate])
+    pages = loose_sand_pages(tmp_path, "one", own, 0.02)
+    assert pages is not None
+    assert pages["sentences"][0].startswith("Sand lies loose at 100 % of the places straight under")
+    (row,) = pages["table"].rows
+    # circles see it from up to 1.5 mm beside it
+    assert [cell.text for cell in row[:4]] == ["1", "under the part", "3 to 11", "4 to 8"]
+    assert [column.title for column in pages["table"].columns][4] == "area, mm²"
+    assert pages["picture"].startswith("data:image/png;base64,")
+    assert pages["surface"] is None
+
+
+def test_none_is_measured_in_2d_or_without_obstacles(folder: Path) -> None:
     assert last_loose_sand(Scenario(dimension=3), folder / "runs" / "one") is None
     assert last_loose_sand(Scenario(), folder / "runs" / "one") is None
     assert loose_sand_pages(folder, "", scene(), 0.02) is None
