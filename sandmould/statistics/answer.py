@@ -91,9 +91,11 @@ class Answer:
     shares: Mapping[str, Setting] = field(default_factory=dict)
     """Settings by the column of the target, by label; empty without one."""
     reach: tuple[Setting, ...] = ()
-    """Settings that reach the target, the gentlest first."""
+    """Settings whose mean reaches the target, the gentlest first."""
+    shown: tuple[Setting, ...] = ()
+    """Those of them whose whole interval does; all of them where nothing is random."""
     shortest: Setting | None = None
-    """That of them which reaches it first, where the runs tell."""
+    """That which reaches it first, of those that are shown to if any are, where the runs tell."""
     shortest_s: float = 0.0
     ends: tuple[SweepEnd, ...] = ()
     table_ends: tuple[SweepEnd, ...] = ()

@@ -181,14 +181,19 @@ def _with_target(answer: Answer, goal: Goal, evidence: Evidence, summary: pd.Dat
         if s.label in shares and sign * (shares[s.label].mean - goal.value) >= 0.0
     ]  # fmt: skip
     reach.sort(key=lambda s: _force(evidence.drives.get(s.label)))
+    shown = [
+        s for s in reach
+        if not answer.asked.by_lot
+        or sign * (shares[s.label].mean - goal.value) >= shares[s.label].ci_half_width
+    ]  # fmt: skip
     times_s = {}
-    for setting in reach if better == "larger" else ():
+    for setting in (shown or reach) if better == "larger" else ():
         runs = _runs(summary, answer.asked, setting)
         times_s[setting.label] = reached_s(evidence.curves, runs, goal.measure, goal.value)
-    told = [s for s in reach if math.isfinite(times_s.get(s.label, math.nan))]
+    told = [s for s in shown or reach if math.isfinite(times_s.get(s.label, math.nan))]
     shortest = min(told, key=lambda s: times_s[s.label], default=None)
     return replace(
-        answer, shares=shares, reach=tuple(reach), shortest=shortest,
+        answer, shares=shares, reach=tuple(reach), shown=tuple(shown), shortest=shortest,
         shortest_s=times_s[shortest.label] if shortest else 0.0,
         decided=Decided.REACHED if reach else Decided.NONE_REACHES,
     )  # fmt: skip

@@ -313,6 +313,26 @@ class AnswerWords:
         return listed([s.label for s in self.answer.verdict.settings if not s.n])
 
     @property
+    def partly(self) -> str:
+        """Settings of which not all runs count, with how many do."""
+        settings = [s for s in self.answer.verdict.settings if 0 < s.n < s.planned]
+        counted = [f"{s.n} of {s.planned} with {s.label}" for s in settings]
+        return listed(counted, most=_MOST_LABELS)
+
+    @property
+    def unsure(self) -> list[Setting]:
+        """Settings whose mean reaches the target, and whose interval does not."""
+        shown = {s.label for s in self.answer.shown}
+        return [s for s in self.answer.reach if s.label not in shown]
+
+    @property
+    def is_alone(self) -> bool:
+        """Whether no setting but the one that reaches the target may reach it."""
+        (one,), goal = self.answer.reach, self.answer.asked.goal
+        others = [s for label, s in self.answer.shares.items() if label != one.label]
+        return goal is not None and all(abs(s.mean - goal.value) > s.ci_half_width for s in others)
+
+    @property
     def no_chance(self) -> str:
         """Settings whose replicates are the same as those of the best."""
         best = self.answer.best

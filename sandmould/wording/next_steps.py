@@ -107,11 +107,12 @@ def answer_steps(study: Study, answer: Answer) -> list[NextStep]:
 
 def _chance(study: Study, answer: Answer) -> Iterable[NextStep]:
     """More runs of each setting, where they would decide or tell chance at all."""
-    if not answer.asked.by_lot or answer.decided is Decided.REACHED:
+    if not answer.asked.by_lot or answer.shown:
         return
     fewest, decided = min(s.n for s in answer.used), answer.decided
     compares = len(answer.used) > 1 and answer.asked.better != "neither"
     is_short = decided is Decided.NONE_REACHES and not answer.verdict.resolved
+    is_short |= decided is Decided.REACHED
     if fewest < (2 if compares and not is_short else FEW):
         runs = max(FEW, study.replicates + (fewest >= FEW))
         if runs > study.replicates:

@@ -82,6 +82,17 @@ def test_several_reach_it_and_one_is_gentlest_another_shortest() -> None:
     assert found.shortest is not None
     assert found.shortest.label == "60 Hz"
     assert found.shortest_s == pytest.approx(0.5 * 0.95 / 0.995, abs=0.003)
+    assert found.shown == found.reach
+
+
+def test_a_mean_beyond_the_target_is_not_shown_to_be() -> None:
+    found = answered.some_reach_on_average()
+    assert labels(found) == ["30 Hz", "45 Hz"]
+    assert [s.label for s in found.shown] == ["45 Hz"]
+    once = table(HZ, **{POCKET: {30: (0.96,), 45: (0.97,)}})
+    answer = answered.answered(once, POCKET, [HZ])
+    assert (answer.decided, answer.shown) == (Decided.REACHED, ())
+    assert [it.line for it in answer_steps(SandStudy(), answer)] == ["replicates: 3"]
 
 
 def test_the_best_at_an_end_is_no_best() -> None:

@@ -11,6 +11,7 @@ from sandmould.kinds.sand.kind import SandStudy
 from sandmould.statistics.answer import Answer, Decided
 from sandmould.wording.answer import detail_sentences, first_sentence, limit_sentences
 from sandmould.wording.next_steps import NextStep, answer_steps
+from tests import answered
 from tests.answered import QUESTIONS
 
 GOLDEN = Path(__file__).parent / "golden"
@@ -49,6 +50,34 @@ def test_full_is_said_where_it_was_asked_alone(name: str) -> None:
     assert "the pocket to 80 % of what fits" in said
     assert "95 %" not in said
     assert "full" not in said
+
+
+@pytest.mark.parametrize(
+    ("fills", "said"),
+    [
+        ({30: (0.9, 1.02, 0.96)}, "The pocket holds 96 ± 15 % of what fits (3 runs) and fills the "
+         "pocket on average, which these runs do not show."),
+        ({30: (0.7, 0.71), 45: (0.9, 1.02)}, "45 Hz fills the pocket on average, with 96 % of what "
+         "fits; 2 runs each do not show it."),
+        ({30: (0.7,), 45: (0.96,)}, "By one run each 45 Hz fills the pocket, with 96 % of what "
+         "fits: how much of that is chance is unknown."),
+        ({30: (0.7, 0.71, 0.7), 45: (0.965, 0.97, 0.975)}, "45 Hz alone fills the pocket, with "
+         "97.0 ± 1.2 % of what fits."),
+    ],
+)  # fmt: skip
+def test_a_target_is_reached_by_what_the_runs_show(
+    fills: dict[float, tuple[float, ...]], said: str
+) -> None:
+    summary = answered.table(answered.HZ, **{answered.POCKET: fills})
+    keys = [answered.HZ] if len(fills) > 1 else []
+    assert first_sentence(answered.answered(summary, answered.POCKET, keys)).strip() == said
+
+
+def test_a_setting_with_some_runs_that_did_not_finish_is_named() -> None:
+    summary = answered.table(answered.HZ, **{answered.POCKET: {30: (0.7, 0.71), 45: (0.96, 0.97)}})
+    summary.loc[3, "outcome_code"] = 1
+    said = first_sentence(answered.answered(summary, answered.POCKET, [answered.HZ]))
+    assert said.endswith("1 of 4 runs did not finish: 1 of 2 with 45 Hz count.")
 
 
 def test_runs_that_did_not_finish_are_told_at_once() -> None:
