@@ -138,7 +138,9 @@ def key_numbers(summary: pd.DataFrame) -> tuple[KeyNumber, ...]:
         count = _total(typical, what, "median")
         if count is not None:
             count_text = f"{count:,.0f}".replace(",", "\u202f")
-            numbers.append(KeyNumber(count_text, f"{what} in a run"))
+            # the deck of a user may lose some
+            where = "in a run" if typical[what].nunique() == 1 else "at the end of the median run"
+            numbers.append(KeyNumber(count_text, f"{what} {where}"))
     wall_s, cpu_s = total_s(summary, WALL_S), total_s(summary, CPU_S)
     if wall_s > 0.0:
         fills = summary[FILL].nunique() if FILL in summary else 0

@@ -336,6 +336,11 @@ def runs_text(count: int) -> str:
     return "1 run" if count == 1 else f"{count} runs"
 
 
+def with_article(name: str) -> str:
+    """A name with its article."""
+    return f"an {name}" if name[0] in "aeio" else f"a {name}"
+
+
 def listed(items: list[str], most: int = 4) -> str:
     """Items as a sentence lists them: ``a, b and c``; of too many the first, and how many more."""
     if len(items) > most:

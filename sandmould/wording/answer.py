@@ -23,6 +23,7 @@ from sandmould.runs.formatting import (
     seconds,
     unit_of,
     value_text,
+    with_article,
     with_margin,
 )
 from sandmould.runs.templates import sentences, worded
@@ -161,6 +162,11 @@ class AnswerWords:
     def name(self) -> str:
         """Name of the measure."""
         return name_of(self.answer.asked.measure)
+
+    @property
+    def a_name(self) -> str:
+        """The same with its article."""
+        return with_article(self.name)
 
     @property
     def space(self) -> str:

@@ -8,7 +8,13 @@ from dataclasses import dataclass
 from sandmould.definition.certificate import frequency_key
 from sandmould.definition.study import Study
 from sandmould.kinds.sand.narrow import Narrow
-from sandmould.runs.formatting import filled_space, listed, name_of, value_text
+from sandmould.runs.formatting import (
+    filled_space,
+    listed,
+    name_of,
+    value_text,
+    with_article,
+)
 from sandmould.runs.templates import worded
 from sandmould.statistics.answer import Answer, Decided
 from sandmould.statistics.config import fewest_points
@@ -93,10 +99,13 @@ def answer_steps(study: Study, answer: Answer) -> list[NextStep]:
         return steps
     if answer.longer_helps:
         steps.append(step("longer", measure=name_of(answer.asked.measure)))
-    for end in answer.ends:
+    is_level = (
+        decided is Decided.OPEN and answer.asked.by_lot and not _is_worth(answer.further_runs)
+    )
+    for end in () if is_level else answer.ends:
         side = "above" if end.is_highest else "below"
         value = value_text(end.key, end.value)
-        steps.append(step("beyond", a_key=_a(name_of(end.key)), side=side, value=value))
+        steps.append(step("beyond", a_key=with_article(name_of(end.key)), side=side, value=value))
     if study.objective.is_fill and (
         answer.nearly_empty or (decided is Decided.NONE_REACHES and not steps)
     ):
@@ -118,17 +127,23 @@ def _chance(study: Study, answer: Answer) -> Iterable[NextStep]:
         if runs > study.replicates:
             yield step("chance", f"replicates: {runs}", runs=runs)
         return
-    if is_short and 0 < answer.runs_to_reach <= WORTH:
+    if is_short and answer.best and 0 < answer.runs_to_reach <= WORTH:
         runs = answer.runs_to_reach
-        yield step("reach", f"replicates: {study.replicates + runs}", runs=runs)
+        yield step("reach", f"replicates: {answer.best.planned + runs}", runs=runs)
     if decided is not Decided.OPEN:
         return
-    settings, more = listed([s.label for s in answer.alike]), answer.further_runs
-    if more is None or more > WORTH:
-        yield step("choose", settings=settings)
+    alike, more = answer.alike, answer.further_runs
+    if not _is_worth(more):
+        yield step("choose", settings=listed([s.label for s in alike]))
         return
-    runs = max(1, more)
-    yield step("more", f"replicates: {study.replicates + runs}", runs=runs, settings=settings)
+    # rounds may have given these settings more runs than the study's file says
+    runs, so_far = max(1, more or 0), max(s.planned for s in alike)
+    best, others = alike[0].label, listed([s.label for s in alike[1:]])
+    yield step("more", f"replicates: {so_far + runs}", runs=runs, best=best, others=others)
+
+
+def _is_worth(further_runs: int | None) -> bool:
+    return further_runs is not None and further_runs <= WORTH
 
 
 def _finer(answer: Answer) -> list[NextStep]:
@@ -156,7 +171,7 @@ def optimum_steps(
         if untried:
             one = "above" if untried[0].is_highest else "below"
             side = one if len(untried) == 1 else "on both sides of"
-            steps.append(step("outside", a_key=_a(name_of(key)), side=side))
+            steps.append(step("outside", a_key=with_article(name_of(key)), side=side))
     low_high = {key: optimum.interval(key) for key in study.refine.interval}
     if any(high - low > study.refine.interval[k] for k, (low, high) in low_high.items()):
         steps.append(step("rounds", f"refine: {{rounds: {study.refine.rounds + 2}}}"))
@@ -207,8 +222,3 @@ def sand_steps(study: Study, is_sound: bool) -> list[NextStep]:
     if not study.calibration.sands or not is_sound:
         return []
     return [step("sand", f"material: {study.calibration.sands[0].name}")]
-
-
-def _a(name: str) -> str:
-    """A name with its article."""
-    return f"an {name}" if name[0] in "aeio" else f"a {name}"

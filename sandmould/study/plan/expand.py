@@ -145,9 +145,16 @@ def coarser_runs(study: OpenStudy, point: Point, replicates: Iterable[int]) -> l
 
 
 def as_planned(point: Point, planned: Sequence[Point]) -> Point:
-    """A chosen point as the sweep has it now: the files that it names may have moved since."""
+    """A chosen point as the sweep writes it now.
+
+    Files that it names may have moved since, and tables have 0.0 for a 0, which a deck would have
+    as another text.
+    """
+    for other in planned:
+        if other == point:
+            return other
     named = by_name(point)
-    if named == point or point in planned:
+    if named == point:
         return point
     return next((other for other in planned if by_name(other) == named), point)
 

@@ -175,6 +175,11 @@ PRINTS = TEMPLATE + "thermo_style custom step time v_speed &\n  v_height # v_wid
             "deck prints: step, time, v_speed, v_height.",
         ),
         (
+            PRINTS + 'if "$(step) < 5" then "run 5" else "run 4"\njump SELF\n',
+            "v_width",
+            "scenario.measures.speed_m_s = 'v_width' cannot be used",
+        ),
+        (
             PRINTS.replace(" time", ""),
             "v_speed",
             "a deck that prints the time: thermo_style custom step time",
@@ -188,6 +193,8 @@ PRINTS = TEMPLATE + "thermo_style custom step time v_speed &\n  v_height # v_wid
         (PRINTS, "KinEng", ""),
         (PRINTS.replace("v_speed", "${what}"), "v_speed", ""),
         (PRINTS + "include more.in\n", "v_width", ""),
+        (PRINTS + 'if "$(step) < 5" then "jump more.in"\n', "v_width", ""),
+        (PRINTS + 'if "$(step) < 5" then "thermo_style custom step time v_width"\n', "v_width", ""),
         (PRINTS + "thermo_modify colname v_height v_width\n", "v_width", ""),
     ],
 )
@@ -365,11 +372,11 @@ def test_what_a_killed_attempt_took_counts(tmp_path: Path) -> None:
     log = folder / "work" / "engine_1.log"
     log.write_text(log.read_text().partition("Loop time")[0])
     (folder / "work" / "restart.b").unlink()
+    (folder / "work" / "spent.json").write_text('{"wall_s": 50.0, "cpu_s": 40.0}')
     second = DECK.execution.compute(run, folder)
     assert second.outcome.outcome is Outcome.FINISHED
     assert second.cost.steps == 110
-    assert second.cost.cpu_s > first.cpu_s
-    assert second.cost.wall_s > first.wall_s
+    assert 40.0 <= second.cost.cpu_s < 50.0 < second.cost.wall_s
     # what began anew is judged by its own steps
     for restart in (folder / "work").glob("restart.*"):
         restart.unlink()

@@ -14,7 +14,7 @@ from sandmould import ROOT
 from sandmould.bad_input import BadInputError
 from sandmould.definition.run import Run
 from sandmould.runs.hashing import scenario_hash
-from sandmould.study.plan.expand import MOST_PROBLEMS, expand, replicate_seed
+from sandmould.study.plan.expand import MOST_PROBLEMS, as_planned, expand, replicate_seed
 from sandmould.study.plan.load_study import open_study
 from sandmould.study.plan.plan_files import read_run
 from tests.bracket import BRACKET
@@ -126,6 +126,13 @@ def test_replicates_are_blocks_with_the_same_seed_at_every_point(runs_of: Runs) 
     assert seeds[3] == {replicate_seed(1, 3)}
     other = runs_of(scenario={"seed": 2})[0]
     assert other.seed == replicate_seed(2, 1) != replicate_seed(1, 1)
+
+
+def test_a_round_writes_a_value_as_the_sweep_does() -> None:
+    # a deck would have 0.0 as another text than 0, and the same seeds twice
+    chosen = as_planned({"friction": 0.0}, [{"friction": 0}, {"friction": 0.5}])
+    assert str(chosen["friction"]) == "0"
+    assert as_planned({"friction": 0.2}, [{"friction": 0}]) == {"friction": 0.2}
 
 
 def test_more_replicates_keep_the_runs_there_are(runs_of: Runs) -> None:

@@ -8,7 +8,7 @@ from collections.abc import Iterator, Sequence
 from sandmould.bad_input import Problem
 from sandmould.scenario.own_deck import CLOCK, OwnDeck
 
-_HIDES = ("include", "jump", "if", "python", "shell", "partition")
+_HIDES = ("include", "jump", "python", "shell", "partition")
 """Commands behind which a deck may print what its text does not show."""
 _OF_USER = re.compile(r"^[vcf]_\w+$")
 """A column that LAMMPS heads as the deck names it."""
@@ -50,13 +50,26 @@ def _printed(deck: str) -> list[str] | None:
     words: list[str] = []
     for line in _commands(deck):
         command, *rest = line
-        if command in _HIDES or (command == "thermo_modify" and {"line", "colname"} & set(rest)):
+        if _hides(line) or (command == "thermo_modify" and {"line", "colname"} & set(rest)):
             return None
         if command == "thermo_style":
             if rest[:1] != ["custom"] or any("$" in word or "*" in word for word in rest):
                 return None
             words += [word for word in rest[1:] if word not in words]
     return words or None
+
+
+def _hides(line: list[str]) -> bool:
+    """Whether a command reads what the text does not show; an ``if`` by one of its own, or prints.
+
+    A jump within the file hides nothing.
+    """
+    command, *rest = line
+    if command == "if":
+        words = [word.strip("\"'") for word in rest]
+        prints = any(word.startswith("thermo") for word in words)
+        return prints or any(_hides(words[k:]) for k in range(len(words)))
+    return command in _HIDES and (command, *rest[:1]) != ("jump", "SELF")
 
 
 def _commands(deck: str) -> Iterator[list[str]]:
