@@ -236,8 +236,8 @@ def none_is_shown_to_reach() -> Answer:
 
 QUESTIONS: Mapping[str, Callable[[], Answer]] = {
     each.__name__: each
-    for each in (none_reaches, several_reach, some_reach_on_average, best_at_an_end, two_cavities, one_value, no_chance,
-                 finest, no_effect, smaller_while_rising, failing_loops, amplitude_swept, too_wide,
-                 by_chance, a_course, far_apart, far_apart_and_least, a_bent_part,
-                 none_is_shown_to_reach)
+    for each in (none_reaches, several_reach, some_reach_on_average, best_at_an_end, two_cavities,
+                 one_value, no_chance, finest, no_effect, smaller_while_rising, failing_loops,
+                 amplitude_swept, too_wide, by_chance, a_course, far_apart, far_apart_and_least,
+                 a_bent_part, none_is_shown_to_reach)
 }  # fmt: skip

@@ -30,6 +30,8 @@ from sandmould.study.plan.plan_files import read_run
 ASKED_EXIT = 143
 """Exit status of a run that stopped early since its job is to end, as a shell gives SIGTERM."""
 _ASKED = (ASKED_EXIT, -signal.SIGTERM)
+_LONGEST = 200
+"""Of the words of an engine."""
 _KILLED = (SERVER_LOST, -signal.SIGKILL, -signal.SIGINT, -signal.SIGHUP, 128 + signal.SIGKILL)
 
 
@@ -123,13 +125,21 @@ def _see_to_end(work: Callable[..., int], folder: Path, log: Path, ranks: int, m
             raise JobError("was killed: the same command continues it")
         if not (folder / "work").exists():
             raise JobError(ended.words)  # before it began
-        why = f"the process ended with status {ended.status}: {ended.words}"
+        words = ended.words or _last_words(folder / "work")
+        why = f"the process ended with status {ended.status}{': ' if words else ''}{words}"
         if (writing := do(write_crash, folder, why, log=log, name=folder.name)).status:
             raise JobError(writing.words)
     if ended.status and work is _do_all:  # what is left is tried once more: its measures
         ended = do(work, folder, ranks, mpi, log=log, name=folder.name)
         if ended.status:
             raise JobError(ended.words)
+
+
+def _last_words(work: Path) -> str:
+    """Last line of an engine's newest log: a user's deck may end it with a word of its own."""
+    logs = sorted(work.glob("*.log"), key=lambda path: path.stat().st_mtime)
+    lines = logs[-1].read_text(encoding="utf-8", errors="replace").split("\n") if logs else []
+    return next((line.strip()[:_LONGEST] for line in reversed(lines) if line.strip()), "")
 
 
 def _do_all(folder: Path, ranks: int, mpi: str) -> int:
