@@ -88,11 +88,12 @@ def cast_fields(folder: Path, scenario: Solidification) -> CastFields:
     above_m = _above_risers_m(fields) if risers else 0.0
     like = _like_the_largest(fed.cut_off) if fed and fed.cut_off else 0
     spot_s = (part or frozen).hot_spot_s
+    others = int((spot_s[1:] >= (1.0 - ALIKE) * spot_s[0]).sum())
     said = sentences(
         "frozen.j2",
         it=frozen,
         part=part,
-        others=int((spot_s[1:] >= (1.0 - ALIKE) * spot_s[0]).sum()),
+        others=others,
         alike=ALIKE,
         fed=fed,
         like=like,
@@ -107,10 +108,10 @@ def cast_fields(folder: Path, scenario: Solidification) -> CastFields:
     riser: tuple[NextStep, ...] = ()
     if not risers and has_modulus and math.isfinite(frozen.solidification_time_s):
         modulus_mm = 1e3 * float(np.nanmax(fields["modulus_m"]))  # the last to freeze has the most
-        riser = (step("riser", it=frozen, modulus_mm=modulus_mm),)
+        riser = (step("riser", it=frozen, modulus_mm=modulus_mm, others=others),)
     elif risers and fed and fed.cut_off:
-        others = len(fed.cut_off) - 1 - like
-        riser = (step("feed", it=fed.cut_off[0].region, like=like, others=others),)
+        smaller = len(fed.cut_off) - 1 - like
+        riser = (step("feed", it=fed.cut_off[0].region, like=like, others=smaller),)
     if above_m:
         riser = (*riser, step("raise", above_m=above_m))
     return CastFields(png(figure, has_scales=True), first, said, tables, fed, riser)

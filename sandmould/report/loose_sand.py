@@ -7,6 +7,8 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+import numpy as np
+
 from sandmould.engines.snapshot import scene_at
 from sandmould.kinds.sand.moments import list_moments
 from sandmould.report.tables import Cell, Column, Table
@@ -44,7 +46,9 @@ def loose_sand_pages(
     if not moments:
         return None
     last, grain_m = moments[-1].load(), scenario.sand.mass_median_diameter_m
-    loose = find_loose_sand(last.position_m, last.radius_m, scene_at(scenario, last), grain_m)
+    # a bed of few grains may have none, in the median, at some distance from a wall
+    with np.errstate(divide="ignore", invalid="ignore"):
+        loose = find_loose_sand(last.position_m, last.radius_m, scene_at(scenario, last), grain_m)
     # where nothing is near, a zone is as large as chance and corners make it
     far = max((zone.measure for zone in loose.zones if zone.side == "away"), default=0.0)
     numbers = [

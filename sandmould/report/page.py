@@ -294,7 +294,7 @@ def _first_screen(
     causes = dict(zip(lost[RUN].astype(str), lost[DETAIL].fillna("").astype(str), strict=True))
     steps = [*failed_steps(causes), *steps, *of_kind.steps, *certificate_steps(study, answer)]
     if is_sound and study.seeks_best and not steps:
-        steps.append(step("try", is_sand=study.kind == "sand"))
+        steps.append(of_kind.at_last or step("try", is_sand=study.kind == "sand"))
     owner = owner_of(page.study_folder)
     after = with_file(steps, owner, shipped_name(owner), page.study_folder.name)
     return FirstScreen(headline, is_sound, figures, table, grounds, after)

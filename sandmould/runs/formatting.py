@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import math
+import re
 from collections.abc import Iterable, Mapping, Sequence
 from numbers import Real
 from typing import Any, TypeGuard
@@ -94,6 +95,9 @@ _ONE_NUMBER = 1e-9
 """Numbers that differ by less, as a share, are one: round-off of a unit."""
 
 
+_PLACE = re.compile(r"(\.\d+)+$")
+"""Of a number in a list."""
+_AXES = "xyz"
 FILL, OF_BED = "_fill_fraction", "_fill_of_bed_fraction"
 """Ends of the measures of a filled space: over its own space, and over what fits."""
 
@@ -105,7 +109,8 @@ def filled_space(measure: str) -> str:
 
 def unit_of(key: str) -> str:
     """Unit that a key's suffix states; empty for a pure number."""
-    return next((unit for suffix, unit in _UNITS if key.endswith(suffix)), "")
+    of_list = _PLACE.sub("", key)
+    return next((unit for suffix, unit in _UNITS if of_list.endswith(suffix)), "")
 
 
 def name_of(key: str) -> str:
@@ -115,8 +120,13 @@ def name_of(key: str) -> str:
     --------
     >>> name_of("vibration.0.frequency_hz")
     'frequency'
+    >>> name_of("shapes.1.high_m.2")
+    'high z'
     """
-    last = key.rsplit(".", 1)[-1]
+    head, _, last = key.rpartition(".")
+    if head and last.isdigit():
+        is_axis = int(last) < len(_AXES) and unit_of(head) == "m"
+        return f"{name_of(head)} {_AXES[int(last)] if is_axis else last}"
     if key in _NAMES or last in _NAMES:
         return _NAMES.get(key) or _NAMES[last]
     if (space := filled_space(last)) != last:

@@ -217,6 +217,14 @@ def narrow_steps(study: Study, answer: Answer, spaces: Sequence[Narrow]) -> list
     return [step("narrow", line, space=space, it=it)]
 
 
+def coarse_step(study: Study, size_scale: float) -> NextStep | None:
+    """Finer grains, where nothing else is left and nothing tells what their size does."""
+    if size_scale <= 1.0 or SIZE_SCALE in study.sweep.swept:
+        return None
+    line = f"scenario: {{sand: {{size_scale: {size_scale / 1.5:.3g}}}}}"
+    return step("coarse", line, times=size_scale)
+
+
 def sand_steps(study: Study, is_sound: bool) -> list[NextStep]:
     """What a calibrated sand is good for."""
     if not study.calibration.sands or not is_sound:

@@ -6,6 +6,7 @@ import errno
 import os
 import re
 import tempfile
+from collections.abc import Iterator, Sequence
 from pathlib import Path
 
 from sandmould.study.plan.plan_files import REPORT_FILE, VERDICT_FILE
@@ -40,10 +41,18 @@ def trouble(folder: Path, log: Path) -> str:
         said = "\n".join(f"{Path(log).stem}: {why}. Its log: {log}" for why, log in of_jobs)
         return f"The study stopped:\n{said}"
     words = [line.strip() for line in text.splitlines() if line.strip()]
-    found = list(dict.fromkeys(line for line in words if _TROUBLE.search(line)))
+    found = list(dict.fromkeys(_headed(words)))
     told = "; ".join(found[:LISTED_LINES] or words[-LISTED_LINES:])
     stopped = f'The study stopped outside its runs. Snakemake told "{told}".'
     return f"{stopped} All that it said: {log}" if told else ""
+
+
+def _headed(words: Sequence[str]) -> Iterator[str]:
+    """Lines that tell of trouble; a head that ends with a colon has the line below it beside it."""
+    for line, below in zip(words, [*words[1:], ""], strict=False):
+        if _TROUBLE.search(line):
+            goes_on = line.endswith(":") and not _TROUBLE.search(below)
+            yield f"{line} {below}".strip() if goes_on else line
 
 
 def last_line(folder: Path) -> str:

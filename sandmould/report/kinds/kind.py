@@ -55,6 +55,8 @@ class KindPages:
     """How sure the answer is."""
     steps: tuple[NextStep, ...] = ()
     """What to do next that other kinds do not ask for."""
+    at_last: NextStep | None = None
+    """What is still worth computing where nothing else is."""
     findings: tuple[str, ...] = ()
     """What stands below the answer, a sentence or two each."""
     warning: str = ""

@@ -37,7 +37,7 @@ from sandmould.study.collect import Collected
 from sandmould.study.robustness.controls import COARSER
 from sandmould.wording.answer import sand_limits
 from sandmould.wording.grounds import sand_grounds
-from sandmould.wording.next_steps import narrow_steps
+from sandmould.wording.next_steps import coarse_step, narrow_steps
 
 
 def _notes(
@@ -93,6 +93,7 @@ def _pages(findings: Findings[Scenario], film_budget_bytes: int) -> KindPages:
         grounds=sand_grounds(
             scenario, study, verdict, findings.scenarios, grain_size.short if grain_size else ()
         ),
+        at_last=None if grain_size else coarse_step(study, scenario.sand.size_scale),
         steps=tuple(narrow_steps(study, findings.answer, narrow_spaces(scenario))),
         warning=_softness(scenario, of_sweep.summary),
     )

@@ -35,6 +35,8 @@ from sandmould.wording.next_steps import NextStep
 
 NEAR_PERCENT = 5.0
 """Off the reference's solidification time: as near as the answer takes for good."""
+_FIRST = ("Last", "Feeding", "Height")
+"""Findings that answer a study of one casting."""
 MOST_POINTS = 600
 """Of a cooling curve."""
 
@@ -74,6 +76,7 @@ def _pages(findings: Findings[Solidification], film_budget_bytes: int) -> KindPa
     error_cost = _error_charts(errors)
     cheapest = "" if study.seeks_best else _cheapest(errors, reference, collected)
     is_one = len(said) > 1 and not keys and not study.seeks_best
+    first_said = [text for text in said if text.partition(":")[0] in _FIRST]
     stand_ins = _stand_ins(findings.answer.stand_ins)
     shown = {
         "pictured_run": run,
@@ -99,8 +102,8 @@ def _pages(findings: Findings[Solidification], film_budget_bytes: int) -> KindPa
             **curve_figures([*([cooling] if cooling else []), *curves]),
         },
         picture=FirstPicture(*first) if first[0] else None,
-        findings=said[2:] if is_one else said,
-        answer=_of_one(findings, said[:2]) if is_one else cheapest,
+        findings=tuple(t for t in said if t not in first_said) if is_one else said,
+        answer=_of_one(findings, first_said) if is_one else cheapest,
         grounds=notes(
             "casting_grounds.j2",
             has_stand_ins=bool(stand_ins),

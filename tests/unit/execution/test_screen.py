@@ -303,6 +303,9 @@ def test_trouble_is_told_once(tmp_path: Path) -> None:
         "host: here\nMissingInputException in rule x:\n\nMissingInputException in rule x:\n"
     )
     assert trouble(tmp_path, log) == told.format("MissingInputException in rule x:")
+    log.write_text("host: here\nWorkflowError:\nAt least one job did not complete.\n")
+    said = "WorkflowError: At least one job did not complete."
+    assert trouble(tmp_path, log) == told.format(said)
     log.write_text("one\ntwo\n")
     assert trouble(tmp_path, log) == told.format("one; two")
 

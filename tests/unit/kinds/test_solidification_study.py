@@ -263,7 +263,8 @@ def test_a_short_riser_leaves_a_plate_without_feed(tmp_path: Path) -> None:
     text, (next_step,) = found[2][0], found[5]
     where = found[2][1].partition(" of liquid (")[2].partition(")")[0]
     assert next_step.text == (
-        f"Let a riser reach the liquid that is cut off at {where}, or a chill freeze it early."
+        f"Let a riser reach the liquid that is cut off at {where}, make the riser there larger, or "
+        "let a chill freeze it early."
     )
     first, risers = (np.nanmax(fields["frozen_s"][part]) for part in (own, fields["riser"]))
     assert text.startswith(f"Last: the part is solid after {number(first)} s, last at x = ")
@@ -352,7 +353,8 @@ def test_a_place_that_freezes_with_the_last_is_counted(tmp_path: Path) -> None:
         at = place.removesuffix(beside)
         assert riser.text == (
             f"Name a riser (risers) that feeds {at}, where the casting freezes last. Its modulus "
-            f"must be larger than that of the casting there, {number(1e3 * modulus_m)} mm."
+            f"must be larger than that of the casting there, {number(1e3 * modulus_m)} mm, as a "
+            f"rule by a fifth.{' The other hot spot needs one, too.' if len(shapes) > 1 else ''}"
         )
 
 

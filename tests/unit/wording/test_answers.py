@@ -9,8 +9,10 @@ import pytest
 
 from sandmould.kinds.sand.kind import SandStudy
 from sandmould.statistics.answer import Answer, Decided
+from sandmould.statistics.config import Better, Goal
+from sandmould.statistics.decision import Evidence, decide
 from sandmould.wording.answer import detail_sentences, first_sentence, limit_sentences
-from sandmould.wording.next_steps import NextStep, answer_steps
+from sandmould.wording.next_steps import NextStep, answer_steps, coarse_step
 from tests import answered
 from tests.answered import QUESTIONS
 
@@ -71,6 +73,31 @@ def test_a_target_is_reached_by_what_the_runs_show(
     summary = answered.table(answered.HZ, **{answered.POCKET: fills})
     keys = [answered.HZ] if len(fills) > 1 else []
     assert first_sentence(answered.answered(summary, answered.POCKET, keys)).strip() == said
+
+
+def test_one_setting_beyond_a_target_is_told_by_its_interval() -> None:
+    summary = answered.table(answered.HZ, solid_fraction={30: (0.5, 0.7)})
+    ways: tuple[tuple[Better, float, str], ...] = (
+        ("larger", 0.62, "misses 0.620"),
+        ("smaller", 0.58, "is beyond 0.580"),
+    )
+    for better, value, said in ways:
+        asked = answered.answered(summary, "solid_fraction", [], better).asked
+        asked = replace(asked, goal=Goal("solid_fraction", value))
+        told = first_sentence(decide(asked, Evidence(summary)))
+        assert said in told
+        assert "on average, which these runs do not show." in told
+
+
+def test_where_nothing_else_is_left_finer_grains_are() -> None:
+    study = SandStudy()
+    found = coarse_step(study, 26.0)
+    assert found is not None
+    assert found.line == "scenario: {sand: {size_scale: 17.3}}"
+    assert found.text.startswith("Compute it once with finer grains: these are 26 times as large")
+    assert coarse_step(study, 1.0) is None
+    swept = SandStudy.model_validate({"sweep": {"keys": {"sand.size_scale": [5, 6]}}})
+    assert coarse_step(swept, 6.0) is None
 
 
 def test_a_setting_with_some_runs_that_did_not_finish_is_named() -> None:
