@@ -389,9 +389,24 @@ class AnswerWords:
     @property
     def refined(self) -> str:
         """The value towards no size at all with its error, chance included."""
+        return self.value(self.sizes.value, self._size_error)
+
+    @property
+    def _size_error(self) -> float:
         finest = min(self.answer.used, key=lambda s: float(s.values[self.sizes.key]))
         chance = finest.ci_half_width if math.isfinite(finest.ci_half_width) else 0.0
-        return self.value(self.sizes.value, math.hypot(self.sizes.error, chance))
+        return math.hypot(self.sizes.error, chance)
+
+    @property
+    def sizes_reach(self) -> str:
+        """Whether that value reaches a target of its measure; empty without one."""
+        asked = self.answer.asked
+        if asked.goal is None or asked.goal.measure != asked.measure:
+            return ""
+        beyond = self.sizes.value - asked.goal.value
+        if abs(beyond) <= self._size_error:
+            return "unknown"
+        return "yes" if (beyond > 0.0) == (asked.better == "larger") else "no"
 
     @property
     def span(self) -> Span:

@@ -89,6 +89,21 @@ def test_one_setting_beyond_a_target_is_told_by_its_interval() -> None:
         assert "on average, which these runs do not show." in told
 
 
+@pytest.mark.parametrize(
+    ("value", "said"),
+    [
+        (60.0, "; the value keeps within 60 s."),
+        (52.0, "; whether the value keeps within 52 s is not known."),
+        (40.0, "; the value is beyond 40 s."),
+    ],
+)
+def test_what_sizes_tell_is_held_against_a_target(value: float, said: str) -> None:
+    answer = QUESTIONS["finest"]()
+    goal = Goal(answer.asked.measure, value)
+    told = replace(answer, asked=replace(answer.asked, goal=goal, better="smaller"))
+    assert said in first_sentence(told)
+
+
 def test_where_nothing_else_is_left_finer_grains_are() -> None:
     study = SandStudy()
     found = coarse_step(study, 26.0)
