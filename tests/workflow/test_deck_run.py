@@ -151,7 +151,7 @@ def test_a_killed_run_goes_on_from_its_restart_file(tmp_path: Path) -> None:
     # the springs give.
     assert 0.00595 < series["log_v_height"].iloc[-1] < 0.006
     cost = read_costs([folder]).rows.iloc[0]
-    assert cost["steps"] < 60000  # of the attempt that ended
+    assert 60000 < cost["steps"] < 120000  # of both attempts
     assert (folder / "output" / "grains.dump").is_file()
     assert not (folder / "work").exists()
     measure_run(folder)

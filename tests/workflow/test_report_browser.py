@@ -213,11 +213,11 @@ def test_run_selector_switches_at_the_same_moment(page: webdriver.Chrome) -> Non
 
 def test_headings_sort_the_runs(page: webdriver.Chrome) -> None:
     def column(place: int) -> list[str]:
-        cells = page.find_elements(By.CSS_SELECTOR, f"table.sortable td:nth-child({place})")
+        cells = page.find_elements(By.CSS_SELECTOR, f"#runs-table td:nth-child({place})")
         return [cell.text for cell in cells]
 
     page.find_element(By.CSS_SELECTOR, "#runs-table summary").click()
-    heads = page.find_elements(By.CSS_SELECTOR, "table.sortable th")
+    heads = page.find_elements(By.CSS_SELECTOR, "#runs-table th")
     fill = next(n for n, head in enumerate(heads, 1) if head.text == "fill of the tube")
     for way in ("ascending", "descending"):
         heads[fill - 1].find_element(By.TAG_NAME, "button").click()
