@@ -22,8 +22,9 @@ if TYPE_CHECKING:
     from sandmould.statistics.answer import SweepEnd
 
 
-FARTHER = 1.01
-"""Beyond an end of the sweep by this factor, a table is asked whether it can go on."""
+FARTHER = 1.1
+"""Beyond an end of the sweep by this factor a table is asked whether it can go on: less is hardly
+another setting (argued)."""
 
 
 class SandStudy(Study):
