@@ -66,12 +66,17 @@ def _swing(course: NDArray[np.float64]) -> float:
 
 
 def reached_s(curves: pd.DataFrame, runs: Iterable[str], measure: str, level: float) -> float:
-    """Time of vibration after which runs reach a level, as their mean; NaN where one does not."""
+    """Time of vibration from which the mean of runs stays at a level or above; NaN where not."""
     shaken = _shaken(curves, runs, measure)
-    times_s = [
-        first_reach_s(run[VIBRATION_TIME_S], run[measure], level) for _, run in shaken.groupby(RUN)
-    ]
-    return float(np.mean(times_s)) if times_s else math.nan
+    of_runs = [(run[VIBRATION_TIME_S], run[measure]) for _, run in shaken.groupby(RUN)]
+    if not of_runs:
+        return math.nan
+    time_s = np.unique(np.concatenate([times for times, _ in of_runs]))
+    mean = np.mean([np.interp(time_s, *curve) for curve in of_runs], axis=0)
+    below = np.flatnonzero(mean < level)
+    if not len(below):
+        return float(time_s[0])
+    return first_reach_s(time_s[below[-1] :], mean[below[-1] :], level)
 
 
 def _shaken(curves: pd.DataFrame, runs: Iterable[str], measure: str) -> pd.DataFrame:

@@ -14,7 +14,7 @@ from sandmould.runs.formatting import filled_space
 from sandmould.statistics.answer import Asked, Decided
 from sandmould.statistics.config import Aim, Goal
 from sandmould.statistics.decision import Evidence, decide
-from sandmould.statistics.over_time import first_reach_s
+from sandmould.statistics.over_time import first_reach_s, reached_s
 from sandmould.statistics.refining import Refining, refining_of, resolution_among
 from sandmould.wording.next_steps import answer_steps, narrow_steps
 from tests import answered
@@ -244,6 +244,20 @@ def test_an_open_question_says_how_many_runs_would_decide() -> None:
 def test_nothing_lies_below_nothing() -> None:
     rolling = table("friction", solid_fraction={0.0: (0.6, 0.61), 0.5: (0.5, 0.52)})
     assert answered.answered(rolling, "solid_fraction", ["friction"]).decided is Decided.BEST
+
+
+def test_a_level_is_reached_where_the_mean_stays_above_it() -> None:
+    # the second run is above at once and falls below again
+    fills = {"a": [0.0, 0.4, 0.8, 1.0], "b": [0.7, 0.6, 0.4, 0.6]}
+    curves = pd.DataFrame(
+        [
+            {"run": run, "stage": "vibrate_1", "vibration_time_s": 0.1 * k, "fill": value}
+            for run, values in fills.items()
+            for k, value in enumerate(values)
+        ]
+    )
+    assert reached_s(curves, fills, "fill", 0.55) == pytest.approx(0.15)
+    assert math.isnan(reached_s(curves, fills, "fill", 0.9))
 
 
 def test_first_reach_is_interpolated() -> None:
