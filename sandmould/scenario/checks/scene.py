@@ -11,7 +11,15 @@ from sandmould.bad_input import BadInputError, Problem
 from sandmould.geometry.drawing_file import MeshFileError
 from sandmould.geometry.outline import outline_fault
 from sandmould.limits import GRAINS
-from sandmould.scenario.box import Plate, Polygon, Tube, plate_blocks, tube_blocks, tube_wall
+from sandmould.scenario.box import (
+    Plate,
+    Polygon,
+    Tube,
+    box_walls,
+    plate_blocks,
+    tube_blocks,
+    tube_wall,
+)
 from sandmould.scenario.checks.cavities import cavity_problems
 from sandmould.scenario.checks.placed import placed_problems
 from sandmould.scenario.checks.unbalance import table_mass_problem, unbalance_problems
@@ -60,8 +68,12 @@ def problems(scenario: Scenario) -> list[Problem]:
 
 def _obstacles(s: Scenario) -> Iterator[Problem]:
     names = [o.name for o in s.obstacles]
+    walls = [wall.name for wall in box_walls(s.box, s.dimension)]
     for i, obstacle in enumerate(s.obstacles):
         key = f"obstacles.{i}"
+        if obstacle.name in walls:
+            valid = f"a name that no wall of the box has: {', '.join(walls)}"
+            yield Problem(f"{key}.name", obstacle.name, valid)
         if names.index(obstacle.name) != i:
             yield Problem(f"{key}.name", obstacle.name, "a name no other obstacle has")
         kinds = KINDS[s.dimension]

@@ -12,9 +12,11 @@ import yaml
 from typer.testing import CliRunner, Result
 
 from sandmould import SHIPPED
+from sandmould.bad_input import BadInputError
 from sandmould.cli.commands import app
 from sandmould.scenario.placement import plan_counts, predicted_bed_height_m
 from sandmould.study.plan.build_plan import Plan, open_plan
+from tests.scenes import open_engine
 
 STL = SHIPPED / "config" / "meshes" / "bracket.stl"
 
@@ -111,6 +113,20 @@ def test_a_pocket_is_closed_at_the_end_that_it_does_not_open_to(opens: str) -> N
     assert end.centre_m[1] == pytest.approx(above + 0.0015 if opens == "down" else below - 0.0015)
     assert left.centre_m[0] + 0.0015 == pytest.approx(pocket.centre_m[0] - 0.015)
     assert right.centre_m[0] - 0.0015 == pytest.approx(pocket.centre_m[0] + 0.015)
+
+
+@pytest.mark.parametrize("name", ["tube", "pocket"])
+def test_an_engine_takes_what_is_written(name: str, tmp_path: Path) -> None:
+    _, plan = written(name)
+    assert open_engine(plan.runs[0].scenario, tmp_path).grains == 0
+
+
+def test_an_obstacle_has_no_name_of_a_wall(tmp_path: Path) -> None:
+    assert new("pocket").exit_code == 0
+    text = Path("my_pocket.yaml").read_text()
+    Path("my_pocket.yaml").write_text(text.replace("left_side", "left"))
+    with pytest.raises(BadInputError, match=r"'left' .* a name that no wall of the box has: floor"):
+        open_plan(Path("my_pocket.yaml"))
 
 
 @pytest.mark.parametrize("name", ["tube", "pocket"])
