@@ -96,7 +96,12 @@ def test_a_setting_at_the_limit_is_within_it() -> None:
 def test_no_step_leads_beyond_the_table(tmp_path: Path) -> None:
     fills = {25: (0.30, 0.31, 0.32), 50: (0.40, 0.42, 0.41), 90: (0.60, 0.61, 0.63)}
     summary = table(HZ, **{FILL: fills, SHARE: fills})
-    for limits, ends_there in (({}, False), ({"highest_frequency_hz": 90}, True)):
+    for limits, ends_there in (
+        ({}, False),
+        ({"highest_frequency_hz": 90}, True),
+        ({"highest_frequency_hz": 95}, True),
+        ({"highest_frequency_hz": 100}, False),
+    ):
         study = planned(tmp_path, table=limits).study.study
         answer = decide(
             Asked(FILL, "larger", (HZ,)), Evidence(summary, table_limit_at=study.table_limit_at)

@@ -57,8 +57,10 @@ def test_full_is_said_where_it_was_asked_alone(name: str) -> None:
 @pytest.mark.parametrize(
     ("fills", "said"),
     [
-        ({30: (0.9, 1.02, 0.96)}, "The pocket holds 96 ± 15 % of what fits (3 runs) and fills the "
-         "pocket on average, which these runs do not show."),
+        ({30: (0.9, 1.02, 0.96)}, "The pocket is full on average, which these runs do not show: it "
+         "holds 96 ± 15 % of what fits (3 runs)."),
+        ({30: (0.96,)}, "The pocket is full: it holds 96 % of what fits (its error is unknown: one "
+         "run)."),
         ({30: (0.7, 0.71), 45: (0.9, 1.02)}, "45 Hz fills the pocket on average, with 96 % of what "
          "fits; 2 runs each do not show it."),
         ({30: (0.7,), 45: (0.96,)}, "By one run each 45 Hz fills the pocket, with 96 % of what "
