@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import re
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
@@ -75,6 +76,8 @@ def _rows(text: str) -> Iterator[dict[str, float]]:
             columns = []
         elif columns and len(words) == len(columns):
             try:
-                yield dict(zip(columns, map(float, words), strict=True))
+                row = dict(zip(columns, map(float, words), strict=True))
             except ValueError:
                 continue
+            if math.isfinite(row[STEP]):
+                yield row
