@@ -10,6 +10,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field
 from enum import StrEnum
 
+from sandmould.runs.formatting import filled_space
 from sandmould.scenario.drive import BoxDrive
 from sandmould.statistics.config import Aim, Better, Goal
 from sandmould.statistics.over_time import Passage
@@ -156,7 +157,9 @@ class Answer:
 
     @property
     def wanted(self) -> tuple[str, ...]:
-        """Labels of the settings that suit it, the best first; none without a result."""
+        """Labels of the settings that suit it, the best first; none where nothing does."""
+        if self.nearly_empty:
+            return ()
         if self.decided is Decided.REACHED:
             return tuple(s.label for s in self.reach)
         if self.decided in (Decided.NO_EFFECT, Decided.EQUAL):
@@ -227,6 +230,10 @@ class Answer:
     @property
     def nearly_empty(self) -> bool:
         """Whether a space that is to be filled holds next to nothing at the best setting."""
-        best = self.shares.get(self.best.label) if self.best else None
-        misses = self.decided is Decided.NONE_REACHES and self.asked.better == "larger"
-        return misses and best is not None and best.mean < NEARLY_EMPTY
+        goal, best = self.asked.goal, self.best
+        if goal is None or best is None or self.asked.better != "larger":
+            return False
+        is_fill = filled_space(self.asked.measure) == filled_space(goal.measure)
+        share = self.shares.get(best.label, best if is_fill else None)
+        misses = self.decided in (Decided.NONE_REACHES, Decided.EQUAL)
+        return misses and share is not None and share.mean < min(NEARLY_EMPTY, goal.value)

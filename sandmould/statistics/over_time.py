@@ -8,12 +8,15 @@ from dataclasses import dataclass
 
 import numpy as np
 import pandas as pd
+import scipy
 from numpy.typing import ArrayLike, NDArray
 
 from sandmould.runs.columns import RUN, STAGE, VIBRATION_TIME_S, during_vibration
 
 STILL = 0.02
 """Share by which a measure may still change in the last quarter of a vibration."""
+SURE = 0.9
+"""One-sided confidence that a mean change is one, where runs do not move one way (argued)."""
 
 
 @dataclass(frozen=True)
@@ -27,17 +30,20 @@ class Passage:
     lasts_s: float
     swing: float = 0.0
     """What it goes back and forth by, the rest after the vibration among it."""
+    chance: float = 0.0
+    """What the mean change of the last quarter may be off by; 0 where all runs move one way."""
 
     @property
     def change(self) -> float:
-        """Share by which it changed in the last quarter; 0 where it is still but for its swing."""
-        return self._moved if abs(self._moved) >= STILL and not self.swings else 0.0
+        """Share by which it changed in the last quarter; 0 where it is still, or not known."""
+        return self._moved if abs(self._moved) >= STILL and not self.is_unclear else 0.0
 
     @property
-    def swings(self) -> bool:
-        """Whether it moves at the end, by no more than it swings."""
-        beyond = abs(self.last - self.late) - self.swing
-        return abs(self._moved) >= STILL and beyond < STILL * abs(self.late)
+    def is_unclear(self) -> bool:
+        """Whether it moves at the end, by no more than it swings or chance makes of it."""
+        moved = abs(self.last - self.late)
+        swings = moved - self.swing < STILL * abs(self.late)
+        return abs(self._moved) >= STILL and (swings or moved <= self.chance)
 
     @property
     def _moved(self) -> float:
@@ -55,7 +61,14 @@ def passage_of(curves: pd.DataFrame, runs: Iterable[str], measure: str) -> Passa
             own = curves[(curves[RUN] == name) & (curves[VIBRATION_TIME_S] >= 0)][measure].dropna()
             swing = _swing(own.to_numpy(dtype=np.float64))
             passages.append((float(value[0]), late, float(value[-1]), float(time_s[-1]), swing))
-    return Passage(*np.mean(passages, axis=0).tolist()) if passages else None
+    if not passages:
+        return None
+    moved = np.array([last - late for _, late, last, *_ in passages])
+    chance = 0.0
+    if moved.min() * moved.max() < 0.0:
+        error = float(moved.std(ddof=1)) / math.sqrt(len(moved))
+        chance = float(scipy.special.stdtrit(len(moved) - 1, SURE)) * error
+    return Passage(*np.mean(passages, axis=0).tolist(), chance)
 
 
 def _swing(course: NDArray[np.float64]) -> float:

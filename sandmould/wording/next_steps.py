@@ -90,33 +90,40 @@ def answer_steps(study: Study, answer: Answer) -> list[NextStep]:
     decided, key = answer.decided, name_of(answer.asked.keys[0]) if answer.asked.keys else ""
     if decided is Decided.NO_RESULT:
         return []
-    if decided in (Decided.NO_EFFECT, Decided.EQUAL):
-        return [step("cheapest", key=key)] if decided is Decided.NO_EFFECT else []
+    if decided is Decided.NO_EFFECT:
+        return [step("cheapest", key=key)]
     if decided is Decided.FINEST:
         return _finer(answer)
-    steps = list(_chance(study, answer))
-    if answer.asked.better == "neither" or decided is Decided.REACHED:
-        return steps
-    if answer.longer_helps:
-        steps.append(step("longer", measure=name_of(answer.asked.measure)))
-    is_level = (
-        decided is Decided.OPEN and answer.asked.by_lot and not _is_worth(answer.further_runs)
-    )
-    for end in () if is_level else answer.ends:
-        side = "above" if end.is_highest else "below"
-        value = value_text(end.key, end.value)
-        steps.append(step("beyond", a_key=with_article(name_of(end.key)), side=side, value=value))
-    if study.objective.is_fill and (
-        answer.nearly_empty or (decided is Decided.NONE_REACHES and not steps)
-    ):
-        space = filled_space(answer.asked.measure).replace("_", " ")
+    steps = [*_chance(study, answer), *_onwards(answer)]
+    reaches = decided is not Decided.NONE_REACHES or steps
+    unclear = answer.passage and answer.passage.is_unclear
+    spaces = [each for each in (answer, *answer.beside) if each.nearly_empty]
+    if study.objective.is_fill and not (spaces or reaches or unclear):
+        spaces = [answer]
+    for each in spaces:
+        space = filled_space(each.asked.measure).replace("_", " ")
         steps.append(step("turn", space=space))
     return steps
 
 
+def _onwards(answer: Answer) -> Iterable[NextStep]:
+    """Longer shaking, or values beyond the ends of the sweep, where these may do better."""
+    decided = answer.decided
+    if answer.asked.better == "neither" or decided in (Decided.REACHED, Decided.EQUAL):
+        return
+    if answer.longer_helps:
+        yield step("longer", measure=name_of(answer.asked.measure))
+    if decided is Decided.OPEN and answer.asked.by_lot and not _is_worth(answer.further_runs):
+        return
+    for end in answer.ends:
+        side = "above" if end.is_highest else "below"
+        value = value_text(end.key, end.value)
+        yield step("beyond", a_key=with_article(name_of(end.key)), side=side, value=value)
+
+
 def _chance(study: Study, answer: Answer) -> Iterable[NextStep]:
     """More runs of each setting, where they would decide or tell chance at all."""
-    if not answer.asked.by_lot or answer.shown:
+    if not answer.asked.by_lot or answer.shown or answer.decided is Decided.EQUAL:
         return
     fewest, decided = min(s.n for s in answer.used), answer.decided
     compares = len(answer.used) > 1 and answer.asked.better != "neither"

@@ -14,8 +14,9 @@ from sandmould.runs.formatting import filled_space
 from sandmould.statistics.answer import Asked, Decided
 from sandmould.statistics.config import Aim, Goal
 from sandmould.statistics.decision import Evidence, decide
-from sandmould.statistics.over_time import first_reach_s, reached_s
+from sandmould.statistics.over_time import first_reach_s, passage_of, reached_s
 from sandmould.statistics.refining import Refining, refining_of, resolution_among
+from sandmould.wording.answer import first_sentence
 from sandmould.wording.next_steps import answer_steps, narrow_steps
 from tests import answered
 from tests.answered import BENT, FILL, FREEZES, HOLE, HZ, POCKET, TIP, G, table
@@ -55,6 +56,43 @@ def test_longer_is_advised_where_it_can_help(
     assert (
         any("Turn the pocket" in each.text for each in answer_steps(study, found)) == nearly_empty
     )
+
+
+@pytest.mark.parametrize(
+    ("ends", "rises", "told"),
+    [
+        ((0.55, 0.5, 0.52), True, False),
+        ((0.55, 0.42, 0.46), False, True),
+        ((0.55, 0.54, 0.449), True, False),
+    ],
+)
+def test_runs_that_do_not_move_one_way_tell_a_rise_beyond_chance_alone(
+    ends: tuple[float, ...], rises: bool, told: bool
+) -> None:
+    """Each run holds 0.45 at three quarters of the time."""
+    rows = [
+        {"run": f"r{n}", "stage": "vibrate_1", "vibration_time_s": at, "fill": fill}
+        for n, end in enumerate(ends)
+        for at, fill in ((0.0, 0.0), (0.5, 0.45), (0.75, 0.45), (0.9, end), (1.0, end))
+    ]
+    found = passage_of(pd.DataFrame(rows), ["r0", "r1", "r2"], "fill")
+    assert found is not None
+    assert (found.change > 0.0, found.is_unclear) == (rises, told)
+
+
+def test_a_space_that_stays_empty_beside_another_is_to_be_turned_and_suits_nothing() -> None:
+    empty = dict.fromkeys(answered.HOLES, (0.0, 0.01, 0.0))
+    summary = table(HZ, **{answered.HOLE: answered.HOLES, POCKET: empty})
+    found = answered.answered(summary, answered.HOLE, [HZ])
+    study = SandStudy.model_validate({"objective": {"measure": answered.HOLE}})
+    turned = [each.text for each in answer_steps(study, found) if each.text.startswith("Turn the")]
+    assert [text.split(",")[0] for text in turned] == ["Turn the pocket"]
+    assert found.beside[0].wanted == ()
+    assert not found.trades
+    assert "among the best" not in first_sentence(found)
+    asked_first = answered.answered(summary, POCKET, [HZ])
+    assert asked_first.decided is Decided.EQUAL
+    assert [each.text for each in answer_steps(study, asked_first)] == turned
 
 
 def test_finer_grains_are_advised_for_the_narrowest_space_that_is_judged() -> None:
