@@ -68,7 +68,8 @@ def passage_of(curves: pd.DataFrame, runs: Iterable[str], measure: str) -> Passa
     if moved.min() * moved.max() < 0.0:
         error = float(moved.std(ddof=1)) / math.sqrt(len(moved))
         chance = float(scipy.special.stdtrit(len(moved) - 1, SURE)) * error
-    return Passage(*np.mean(passages, axis=0).tolist(), chance)
+    first, late, end, lasts_s, swing = np.mean(passages, axis=0).tolist()
+    return Passage(first, late, end, lasts_s, swing, chance)
 
 
 def _swing(course: NDArray[np.float64]) -> float:
