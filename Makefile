@@ -15,7 +15,7 @@ TWINS := engine_twins damping_forms contact_readings rolling_axes frames
 LINT := lint-style lint-types lint-imports lint-rules lint-names
 
 .DEFAULT_GOAL := help
-.PHONY: help install demo study plan status report quick fast-tests test all-tests other-python lint $(LINT) architecture decks schema lock lock-check results-check results-pages docs clean
+.PHONY: help install demo study plan status report quick fast-tests test all-tests other-python lint $(LINT) architecture decks schema lock lock-check results results-check results-pages docs clean
 .PHONY: twins verification stability rebound size-ratio lammps-decks at-rest core-loop size reliability fuzz benchmarks peers scaling solidification flow \
   reproduction speed-accuracy
 
@@ -214,6 +214,10 @@ lock-check: $(INSTALLED)
 ## list stale results of docs/results and compute the smallest again
 results-check: $(INSTALLED)
 	$(BIN)/python -m sandmould.execution.records check
+
+## compute all stale results of docs/results again, the cheapest first; goes on where it stopped
+results: $(INSTALLED)
+	$(BIN)/python -m sandmould.execution.records renew
 
 ## the page of each committed result, and their list docs/results/README.md
 results-pages: $(INSTALLED)

@@ -2,7 +2,8 @@
 
 ``python -m sandmould.execution.records record STUDY.yaml [FIGURE ...]`` copies a finished study's
 tables, and the figures that its pages show, with what was run. ``check`` lists the records that
-are stale and computes the smallest one of each kind again.
+are stale and computes the smallest one of each kind again. ``renew`` makes all that are stale
+again.
 """
 
 from __future__ import annotations
@@ -58,7 +59,9 @@ OLD_DEFAULTS = "old defaults"
 OLDER_SOLVER = "older solver"
 """Of a record: its scenarios are those of today, what computes them has changed since. It counts
 as long as the cheapest study of its kind, computed again, agrees with its own record."""
-USAGE = "python -m sandmould.execution.records check | record STUDY.yaml [FIGURE ...]"
+USAGE = "python -m sandmould.execution.records check | renew | record STUDY.yaml [FIGURE ...]"
+MOST_S = 3 * 3600.0
+"""Processor time above which a record is not made again unasked (argued)."""
 SAME = {
     "tube_fill_fraction": 0.05,
     "solid_fraction": 0.02,
@@ -258,8 +261,7 @@ def _recompute(name: str, study: str, results: Path) -> list[str]:
     if (RECORDS / name / ROUNDS_FILE).exists():
         (results / name).mkdir(parents=True)
         shutil.copy(RECORDS / name / ROUNDS_FILE, results / name / ROUNDS_FILE)
-    command = [str(Path(sys.executable).parent / "sandmould"), "run", study]
-    subprocess.run(command, cwd=ROOT, check=True)
+    _compute(study)
     old, new = read_summary(RECORDS / name), read_summary(results / name)
     return [
         f"{name}: mean {column} is {new[column].mean():.4f}, recorded {old[column].mean():.4f}"
@@ -268,8 +270,56 @@ def _recompute(name: str, study: str, results: Path) -> list[str]:
     ]
 
 
+def _compute(study: str) -> None:
+    command = [sys.executable, "-m", "sandmould.cli", "run", study]
+    subprocess.run(command, cwd=ROOT, check=True)
+
+
+def renew(results: Path) -> int:
+    """Compute all records that are not of today's code again, the cheapest first, and keep them.
+
+    What was computed before stays: called again, it goes on. A study that needs an engine which
+    this machine lacks, or longer than ``MOST_S``, is named and left.
+
+    Returns
+    -------
+    int
+        Studies whose command failed.
+    """
+    waiting: list[tuple[float, str, str]] = []
+    for name, why in stale_records():
+        kept = json.loads((RECORDS / name / "record.json").read_text(encoding="utf-8"))
+        study = kept["study"]
+        if not why or not (ROOT / study).exists():
+            continue
+        runs = runs_in(open_study(ROOT / study), results / name)
+        planning = kind_of(runs[0].scenario).planning
+        lacks = [planning.engine_problem(run.scenario) for run in runs]
+        cost_s = sum(planning.predicted_s(run.scenario) for run in runs)
+        # the plan's sum counts a fill that runs share once for each
+        cost_s = min(cost_s, kept.get("wall_s_of_all_runs", math.inf))
+        if any(lacks):
+            print(f"{name} is left: {next(filter(None, lacks))}")
+        elif cost_s > MOST_S:
+            print(f"{name} is left: it takes about {cost_s / 3600:.1f} h")
+        else:
+            waiting.append((cost_s, name, study))
+    failed = 0
+    for number, (cost_s, name, study) in enumerate(sorted(waiting), 1):
+        print(f"[{number}/{len(waiting)}] {name}, about {cost_s / 60:.0f} min", flush=True)
+        try:
+            _compute(study)
+            record(Path(study), results)
+        except (subprocess.CalledProcessError, SystemExit) as fault:
+            print(f"{name} has no new record: {fault}", flush=True)
+            failed += 1
+    return failed
+
+
 def main(arguments: list[str]) -> int:
-    """Check all records, or keep one study."""
+    """Check all records, make them again, or keep one study."""
+    if arguments == ["renew"]:
+        return min(renew(Path("results")), 1)
     if arguments[:1] == ["record"] and len(arguments) > 1:
         print(record(Path(arguments[1]), Path("results"), arguments[2:]))
         return 0

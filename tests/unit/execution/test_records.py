@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import math
+import subprocess
 import zipfile
 from pathlib import Path
 
@@ -164,6 +165,35 @@ def test_records_of_an_older_solver_count_while_the_cheapest_study_gives_the_sam
     last = capsys.readouterr().out.splitlines()[-1]
     assert said in last
     assert last.endswith(": there.")
+
+
+def test_stale_records_are_made_again_the_cheapest_first_and_a_failure_stops_no_other(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    names = ("tube_demo", "plates_small", "bracket_paper", "tank_start")
+    for name in names:
+        (tmp_path / name).mkdir()
+        study = {"study": f"config/studies/{name}.yaml"}
+        (tmp_path / name / "record.json").write_text(json.dumps(study))
+    told = [(name, records.OLD_DEFAULTS) for name in names[:3]] + [("tank_start", "")]
+    monkeypatch.setattr(records, "RECORDS", tmp_path)
+    monkeypatch.setattr(records, "stale_records", lambda: told)
+    monkeypatch.setattr(records, "MOST_S", 0.5 * records.MOST_S)
+    computed, kept = [], []
+
+    def compute(study: str) -> None:
+        computed.append(Path(study).stem)
+        if "plates" in study:
+            raise subprocess.CalledProcessError(1, study)
+
+    monkeypatch.setattr(records, "_compute", compute)
+    monkeypatch.setattr(records, "record", lambda study, results: kept.append(study.stem))
+    assert records.main(["renew"]) == 1
+    assert computed == ["plates_small", "tube_demo"]
+    assert kept == ["tube_demo"]
+    said = capsys.readouterr().out
+    assert "bracket_paper is left: it takes about" in said
+    assert "plates_small has no new record" in said
 
 
 def test_unfinished_study_is_not_recorded(tmp_path: Path) -> None:
