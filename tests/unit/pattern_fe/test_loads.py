@@ -200,3 +200,30 @@ def test_even_pressures_above_and_below_a_flange_are_found_again() -> None:
     assert below_pa == pytest.approx(200.0)
     nothing = pressure_above_and_below_pa(outer, load_n, np.zeros_like(free))
     assert np.isnan(nothing).all()
+
+
+@pytest.mark.parametrize("kind", ["an L", "hexahedra", "tetrahedra"])
+def test_pressures_of_many_contacts_are_those_of_a_count_by_faces(kind: str) -> None:
+    """Contacts of unlike force, twice as many at one end: each face's sum over its own area."""
+    pattern = l_pattern() if kind == "an L" else pattern_of_kind(kind, 2)
+    outer = pattern.surface.outer
+    free = ~outer.held(pattern.fixed).any(axis=1)
+    random = np.random.default_rng(7)
+    area_m2 = outer.facet_area_vector_m2
+    size_m2 = np.linalg.norm(area_m2, axis=1)
+    normal = area_m2 / size_m2[:, None]
+    facet = random.choice(len(size_m2), 20_000, p=size_m2 / size_m2.sum())
+    share = random.dirichlet(np.ones(outer.facets.shape[1]), len(facet))
+    corners_m = outer.vertices_m[outer.facets[facet]]
+    point_m = np.einsum("ni,nij->nj", share, corners_m)
+    along = (point_m[:, 0] - point_m[:, 0].min()) / np.ptp(point_m[:, 0])
+    press_n = (1.0 + along) * random.exponential(1e3 * size_m2.sum() / len(facet), len(facet))
+    force_n = -press_n[:, None] * normal[facet]
+    told = pressure_above_and_below_pa(outer, vertex_loads_n(outer, facet, point_m, force_n), free)
+    counted = free[outer.facets].all(axis=1)
+    for pressure_pa, faces in zip(
+        told, (counted & (normal[:, -1] > 0.5), counted & (normal[:, -1] < -0.5)), strict=True
+    ):
+        if faces.any():
+            by_count_pa = -force_n[faces[facet], -1].sum() / area_m2[faces, -1].sum()
+            assert pressure_pa == pytest.approx(by_count_pa, rel=0.02)
