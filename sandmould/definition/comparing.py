@@ -45,7 +45,7 @@ def _target(aim: Aim, key: str) -> Iterator[Problem]:
         return
     valid = ""
     if aim.better == "neither":
-        valid = f"absent where {key}.better is neither"
+        valid = f"absent, or null over an inherited one, where {key}.better is neither"
     elif target == FULL and not (aim.is_fill and aim.better == "larger"):
         valid = f"a value of {aim.measure}: {FULL} is for the fill of a tube or cavity"
     elif (

@@ -10,7 +10,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field
 from enum import StrEnum
 
-from sandmould.runs.formatting import filled_space
+from sandmould.runs.formatting import FILL, OF_BED
 from sandmould.scenario.drive import BoxDrive
 from sandmould.statistics.config import Aim, Better, Goal
 from sandmould.statistics.over_time import Passage
@@ -180,15 +180,22 @@ class Answer:
         return goal is not None and any(abs(goal.value - s.mean) <= s.ci_half_width for s in known)
 
     @property
-    def runs_to_reach(self) -> int:
-        """Further runs of the best setting that would tell whether it reaches the target, or 0.
+    def unsure(self) -> tuple[Setting, ...]:
+        """Settings whose mean reaches the target, and whose interval does not."""
+        shown = {s.label for s in self.shown}
+        return tuple(s for s in self.reach if s.label not in shown)
+
+    def runs_to_reach(self, setting: Setting | None) -> int:
+        """Further runs of a setting that would tell whether it reaches the target, or 0.
 
         An interval shrinks with the root of the number of runs.
         """
-        share = self.shares.get(self.best.label) if self.best else None
-        if share is None or self.asked.goal is None or not self.may_reach:
+        share = self.shares.get(setting.label) if setting else None
+        if share is None or self.asked.goal is None or not math.isfinite(share.ci_half_width):
             return 0
         missing = abs(self.asked.goal.value - share.mean)
+        if missing == 0.0:
+            return 0
         return max(0, math.ceil(share.n * ((share.ci_half_width / missing) ** 2 - 1.0)))
 
     @property
@@ -206,6 +213,15 @@ class Answer:
         """Of a bending pattern's measure: its value at the best setting before it was shaken."""
         bends = self.asked.measure in BENDING
         return self.passage.first if self.passage and bends else None
+
+    @property
+    def chance_at_finest(self) -> float:
+        """Half width of the mean at the finest size; 0 where one run or no chance tells none."""
+        if self.refining is None:
+            return 0.0
+        key = self.refining.key
+        half = min(self.used, key=lambda s: float(s.values[key])).ci_half_width
+        return half if math.isfinite(half) else 0.0
 
     @property
     def still_changes(self) -> float:
@@ -231,9 +247,9 @@ class Answer:
     def nearly_empty(self) -> bool:
         """Whether a space that is to be filled holds next to nothing at the best setting."""
         goal, best = self.asked.goal, self.best
-        if goal is None or best is None or self.asked.better != "larger":
+        is_fill = self.asked.measure.endswith((FILL, OF_BED)) and self.asked.better == "larger"
+        if goal is None or best is None or not is_fill:
             return False
-        is_fill = filled_space(self.asked.measure) == filled_space(goal.measure)
-        share = self.shares.get(best.label, best if is_fill else None)
         misses = self.decided in (Decided.NONE_REACHES, Decided.EQUAL)
-        return misses and share is not None and share.mean < min(NEARLY_EMPTY, goal.value)
+        share = self.shares.get(best.label, best).mean
+        return misses and share < min(NEARLY_EMPTY, goal.value)

@@ -14,7 +14,7 @@ from sandmould.statistics.mean_tests import MeanTest, alike_pvalue, compare_mean
 
 Array = NDArray[np.float64]
 _ROUND_OFF = 1e-10
-_UNLIKE = 0.001
+_UNLIKE = 0.01
 """Chance of spreads so unlike, below which settings do not share one."""
 
 

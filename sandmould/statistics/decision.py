@@ -24,6 +24,7 @@ from sandmould.statistics.answer import (
 )
 from sandmould.statistics.config import Aim, Goal
 from sandmould.statistics.evidence import left_out_counts, one_way_runs, usable_values
+from sandmould.statistics.main_effects import has_trend
 from sandmould.statistics.over_time import passage_of, reached_s
 from sandmould.statistics.refining import Refining, refining_of, resolution_among
 from sandmould.statistics.settings import Setting, number_blocks, setting_rows
@@ -129,7 +130,7 @@ def _with_limits(
     """With the ends of the sweep, what further runs would do, and how the best one went on."""
     best, verdict = answer.best, answer.verdict
     assert best is not None
-    ends = _ends(best, verdict.settings, answer.asked.keys, answer.alike)
+    ends = _ends(best, verdict, answer.asked.keys)
     known = [errors.get(s.label) for s in (best, verdict.runner_up) if s is not None]
     answer = replace(
         answer,
@@ -213,21 +214,18 @@ def _runs(summary: pd.DataFrame, asked: Asked, setting: Setting) -> list[str]:
     return []
 
 
-def _ends(
-    best: Setting, settings: Sequence[Setting], keys: Sequence[str], alike: Sequence[Setting]
-) -> tuple[SweepEnd, ...]:
+def _ends(best: Setting, verdict: Verdict, keys: Sequence[str]) -> tuple[SweepEnd, ...]:
     """Ends of swept numbers at which the best lies: the true best may lie beyond.
 
-    ``settings``: all that were swept, those without a run that counts among them. A key of several
-    is left out where a setting that differs in it alone is as good, see ``alike``.
+    Settings without a run that counts are among those that were swept. Where the best is not told
+    from all others, a key counts if the measure goes one way with it, see ``has_trend``.
     """
-    found = []
+    found, settings = [], verdict.settings
     for key in keys:
         values = [s.values[key] for s in settings]
         if not all(is_number(v) and math.isfinite(v) for v in values):
             continue
-        others = [{k: v for k, v in s.values.items() if k != key} for s in (best, *alike[1:])]
-        if len(keys) > 1 and others[0] in others[1:]:
+        if not verdict.resolved and not has_trend(verdict, key):
             continue
         mine, low, high = float(best.values[key]), min(values), max(values)
         # Below nothing there is no value to try.

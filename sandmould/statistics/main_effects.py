@@ -14,6 +14,9 @@ from sandmould.statistics.settings import Comparison
 from sandmould.statistics.verdict import Verdict
 
 _ROUND_OFF = 1e-12
+TREND = 0.25
+"""Chance of a trend of its size, from which on it is none to go by: to try a value costs little
+(argued)."""
 
 
 @dataclass(frozen=True)
@@ -53,3 +56,21 @@ def main_effects(verdict: Verdict, keys: Sequence[str]) -> tuple[MainEffect, ...
             apart = Comparison.of(str(values[low]), difference, test, verdict.by_factor)
             found.append(MainEffect(key, values[high], values[low], apart))
     return tuple(found)
+
+
+def has_trend(verdict: Verdict, key: str) -> bool:
+    """Whether a measure goes one way with a key of numbers, averaged over the other keys.
+
+    The line through the means over the rank of the key's values is tested by the scatter that all
+    settings share. True where one run each tells nothing of chance.
+    """
+    spread, used = verdict.spread, [s for s in verdict.settings if s.n]
+    if spread is None or spread.contrasts.df <= 0:
+        return True
+    levels = sorted({s.values[key] for s in used})
+    rank = np.array([levels.index(s.values[key]) for s in used], dtype=np.float64)
+    difference, scale = spread.contrasts.weighed(rank - rank.mean())
+    error = spread.contrasts.sd * scale
+    if not error > _ROUND_OFF * float(np.abs(spread.contrasts.means).max()):
+        return True
+    return MeanTest(difference, error, spread.contrasts.df).pvalue < TREND

@@ -183,6 +183,11 @@ class AnswerWords:
         return name_of(keys[0]) if len(keys) == 1 else "setting"
 
     @property
+    def sweeps_time(self) -> bool:
+        """Whether it is swept for how long the box shakes: no other time is then worth telling."""
+        return any(key.endswith("duration_s") for key in self.answer.asked.keys)
+
+    @property
     def is_scale(self) -> bool:
         """Whether one key with numbers is swept."""
         keys = self.answer.asked.keys
@@ -234,8 +239,10 @@ class AnswerWords:
     def has_margin(self) -> bool:
         """Whether the best setting's share has a margin that says something."""
         best = self.answer.best
-        share = self.answer.shares.get(best.label) if best else None
-        return share is None or not share.ci_half_width > WIDEST
+        share, goal = self.answer.shares.get(best.label) if best else None, self.answer.asked.goal
+        if share is None or goal is None or not goal.measure.endswith("_fraction"):
+            return True
+        return not share.ci_half_width > WIDEST
 
     @property
     def target(self) -> str:
@@ -326,12 +333,6 @@ class AnswerWords:
         return listed(counted, most=_MOST_LABELS)
 
     @property
-    def unsure(self) -> list[Setting]:
-        """Settings whose mean reaches the target, and whose interval does not."""
-        shown = {s.label for s in self.answer.shown}
-        return [s for s in self.answer.reach if s.label not in shown]
-
-    @property
     def is_alone(self) -> bool:
         """Whether no setting but the one that reaches the target may reach it."""
         (one,), goal = self.answer.reach, self.answer.asked.goal
@@ -339,10 +340,20 @@ class AnswerWords:
         return goal is not None and all(abs(s.mean - goal.value) > s.ci_half_width for s in others)
 
     @property
+    def effects(self) -> str:
+        """Of several swept keys those that make a difference, averaged over the others."""
+        keys = self.answer.asked.keys
+        names = distinct_names(keys)
+        told = [it for it in main_effects(self.answer.verdict, keys) if it.apart.separated]
+        return listed([names[it.key] for it in told])
+
+    @property
     def no_chance(self) -> str:
         """Settings whose replicates are the same as those of the best."""
         best = self.answer.best
-        if best is None or best.n < 2 or self.answer.decided is Decided.NO_EFFECT:
+        if best is None or best.n < 2:
+            return ""
+        if self.answer.decided in (Decided.NO_EFFECT, Decided.EQUAL):
             return ""
         against = self.answer.verdict.comparisons
         same = [c.other for c in against if not c.tested and self.verdict.setting(c.other).n > 1]
@@ -393,9 +404,7 @@ class AnswerWords:
 
     @property
     def _size_error(self) -> float:
-        finest = min(self.answer.used, key=lambda s: float(s.values[self.sizes.key]))
-        chance = finest.ci_half_width if math.isfinite(finest.ci_half_width) else 0.0
-        return math.hypot(self.sizes.error, chance)
+        return math.hypot(self.sizes.error, self.answer.chance_at_finest)
 
     @property
     def sizes_reach(self) -> str:

@@ -38,6 +38,7 @@ def scatter_grounds(verdict: Verdict, differ_in: str, seeks_best: bool) -> tuple
         runs=[s.n for s in used],
         differ_in=differ_in,
         sd=sd_text if sds else "",
+        unlike=verdict.spread is not None and verdict.spread.are_unlike,
         first=first if first and first.tested and verdict.best else None,
     )
 

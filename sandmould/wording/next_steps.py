@@ -123,6 +123,8 @@ def _onwards(answer: Answer) -> Iterable[NextStep]:
 
 def _chance(study: Study, answer: Answer) -> Iterable[NextStep]:
     """More runs of each setting, where they would decide or tell chance at all."""
+    if answer.shown:
+        yield from _also_reach(answer)
     if not answer.asked.by_lot or answer.shown or answer.decided is Decided.EQUAL:
         return
     fewest, decided = min(s.n for s in answer.used), answer.decided
@@ -134,8 +136,8 @@ def _chance(study: Study, answer: Answer) -> Iterable[NextStep]:
         if runs > study.replicates:
             yield step("chance", f"replicates: {runs}", runs=runs)
         return
-    if is_short and answer.best and 0 < answer.runs_to_reach <= WORTH:
-        runs = answer.runs_to_reach
+    runs = answer.runs_to_reach(answer.best) if answer.may_reach else 0
+    if is_short and answer.best and 0 < runs <= WORTH:
         yield step("reach", f"replicates: {answer.best.planned + runs}", runs=runs)
     if decided is not Decided.OPEN:
         return
@@ -149,6 +151,15 @@ def _chance(study: Study, answer: Answer) -> Iterable[NextStep]:
     yield step("more", f"replicates: {so_far + runs}", runs=runs, best=best, others=others)
 
 
+def _also_reach(answer: Answer) -> Iterable[NextStep]:
+    """More runs of settings that reach the target on average, where others are shown to."""
+    needed = {s: runs for s in answer.unsure if 0 < (runs := answer.runs_to_reach(s)) <= WORTH}
+    if needed:
+        runs, planned = max(needed.values()), max(s.planned for s in needed)
+        names = listed([s.label for s in needed])
+        yield step("reach_too", f"replicates: {planned + runs}", runs=runs, settings=names)
+
+
 def _is_worth(further_runs: int | None) -> bool:
     return further_runs is not None and further_runs <= WORTH
 
@@ -158,12 +169,11 @@ def _finer(answer: Answer) -> list[NextStep]:
     refining = answer.refining
     assert refining is not None
     share = refining.error / abs(refining.value) if refining.value else 0.0
-    if share <= FINE_ENOUGH:
+    if share <= FINE_ENOUGH or refining.error <= answer.chance_at_finest:
         return []
-    tree = f"{refining.sizes[-1] / 2:g}"
-    for part in reversed(refining.key.split(".")):
-        tree = f"{{{part}: {tree}}}"
-    return [step("finer", f"scenario: {tree}", key=name_of(refining.key), percent=100 * share)]
+    sizes = ", ".join(f"{size:g}" for size in (*refining.sizes, refining.sizes[-1] / 2))
+    line = f"sweep: {{keys: {{{refining.key}: [{sizes}]}}}}"
+    return [step("finer", line, key=name_of(refining.key), percent=100 * share)]
 
 
 def optimum_steps(

@@ -31,6 +31,7 @@ from sandmould.kinds.stored_speed import StoredSpeed
 from sandmould.runs.files import write_text
 from sandmould.runs.formatting import display_number, name_of
 from sandmould.runs.parent import end_with_parent, print_to
+from sandmould.runs.templates import worded
 from sandmould.runs.words import say
 from sandmould.scenario.own_deck import OwnDeck
 
@@ -117,7 +118,10 @@ def pilot(scenario: OwnDeck, results: Path, pilot_s: float = PILOT_S) -> tuple[f
         if status is not None and not (folder / "whole.json").exists():
             raise BadInputError([_failure(scenario, folder, status, results)])
         whole = _measured(scenario, folder / "work")
-        shown = (_lacks(scenario, whole), _resumed(scenario, whole, folder, pilot_s))
+        is_whole = (folder / "whole.json").exists()
+        beyond = _beyond(scenario, whole) if is_whole else ""
+        resumed = _resumed(scenario, whole, folder, pilot_s)
+        shown = (_lacks(scenario, whole), beyond, resumed)
         return core_s, "\n".join(f"{_of_values(scenario)}: {said}." for said in shown if said)
 
 
@@ -137,6 +141,20 @@ def _lacks(scenario: OwnDeck, series: pd.DataFrame) -> str:
     logged = [str(name).removeprefix(LOGGED) for name in series]
     missing = missing_columns(scenario, logged) if len(series) else ""
     return f"in its first seconds {missing.rstrip('.')}" if missing else ""
+
+
+def _beyond(scenario: OwnDeck, series: pd.DataFrame) -> str:
+    """Say which windows of measures do not lie within a whole run."""
+    if "time_s" not in series or not len(series):
+        return ""
+    lasts_s = float(series["time_s"].iloc[-1] - series["time_s"].iloc[0])
+    windows = {
+        f"measures.{name}.{key}": value
+        for name, taken in scenario.taken.items()
+        for key, value in (("from_s", taken.from_s), ("over_last_s", taken.over_last_s))
+        if value is not None and value > lasts_s * (1.0 + 1e-6)  # round-off
+    }
+    return worded("deck_windows.j2", windows=windows, lasts_s=lasts_s) if windows else ""
 
 
 def _resumed(scenario: OwnDeck, whole: pd.DataFrame, folder: Path, pilot_s: float) -> str:
@@ -195,13 +213,14 @@ def _failure(scenario: OwnDeck, folder: Path, status: int, results: Path) -> Pro
     """Say why a pilot failed, and keep its log."""
     why = folder / "why.txt"
     said = why.read_text(encoding="utf-8") if why.exists() else f"its process ended with {status}"
+    told = said.rstrip(". ")
     logs = [path for path in (folder / "work" / "engine_1.log", folder / "log") if path.exists()]
     kept = results / FAILED_LOG
     results.mkdir(parents=True, exist_ok=True)
     shutil.copy(logs[0], kept)
     return Problem(
         "scenario.template", scenario.template, "a deck that runs",
-        sentence=f"{_of_values(scenario)} stopped in a short pilot run. {said.rstrip('. ')}. Its "
+        sentence=f"{_of_values(scenario)} stopped in a pilot run, so none was begun. {told}. Its "
         f"log: {display_path(kept)}",
     )  # fmt: skip
 

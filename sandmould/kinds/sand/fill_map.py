@@ -18,7 +18,7 @@ import yaml
 from sandmould import SHIPPED
 from sandmould.scenario.box import Tube
 from sandmould.scenario.drive import laid_down_drive
-from sandmould.scenario.hardness import Hardness, bed_hardness
+from sandmould.scenario.hardness import bed_hardness
 from sandmould.scenario.scenario import Scenario
 
 MAP = SHIPPED / "config" / "fill_map.yaml"
@@ -50,23 +50,24 @@ def _foretold(scenario: Scenario) -> float:
     """Fill of the tube of the records at a setting; NaN where they do not tell it."""
     tubes = [obstacle for obstacle in scenario.obstacles if isinstance(obstacle, Tube)]
     hardness = bed_hardness(scenario)
-    if len(tubes) != 1 or len(scenario.vibrations) != 1 or hardness is None:
+    is_alone = len(scenario.obstacles) == len(tubes) == 1 and scenario.pattern is None
+    if not is_alone or len(scenario.vibrations) != 1 or hardness is None:
         return np.nan
     (stage,) = scenario.vibrations
-    if stage.unit_direction(scenario.dimension)[-1] < 1.0 or not _in_range(tubes[0], hardness):
+    asked = {
+        "tube_width_m": tubes[0].diameter_m,
+        "bed_depth_m": hardness.depth_m,
+        "wave_speed_m_s": hardness.wave_speed_m_s,
+        "size_scale": scenario.sand.size_scale,
+        "duration_s": stage.duration_s,
+    }
+    told = _map()["range"].items()
+    in_range = all(low <= asked[name] <= high for name, (low, high) in told)
+    if stage.unit_direction(scenario.dimension)[-1] < 1.0 or not in_range:
         return np.nan
     drive = laid_down_drive(stage)
     fall_m_s = math.sqrt(scenario.gravity_m_s2 * hardness.depth_m)
     return _at(drive.velocity_m_s / fall_m_s, drive.frequency_hz / hardness.column_hz)
-
-
-def _in_range(tube: Tube, hardness: Hardness) -> bool:
-    asked = {
-        "tube_width_m": tube.diameter_m,
-        "bed_depth_m": hardness.depth_m,
-        "wave_speed_m_s": hardness.wave_speed_m_s,
-    }
-    return all(low <= asked[name] <= high for name, (low, high) in _map()["range"].items())
 
 
 def _at(over_fall: float, in_modes: float) -> float:

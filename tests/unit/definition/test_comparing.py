@@ -248,7 +248,10 @@ def test_deck_is_made_from_its_own_dialect_and_solver(planned: Planned) -> None:
     ("objective", "valid"),
     [
         ({"target": 1.2}, "above 0 and at most 1"),
-        ({"target": 0.5, "better": "neither"}, "absent where objective.better is neither"),
+        (
+            {"target": 0.5, "better": "neither"},
+            "absent, or null over an inherited one, where objective.better is neither",
+        ),
         ({"measure": "solid_fraction", "target": "full"}, "a value of solid_fraction"),
     ],
 )

@@ -54,13 +54,15 @@ def test_half_the_gravity_is_left_at_half_the_acceleration(tmp_path: Path) -> No
         assert ("Below 1 g" in plan) is is_weak
 
 
-def foretold(folder: Path, hold: str, values: list[float], **scenario: Any) -> float:
+def foretold(
+    folder: Path, hold: str, values: list[float], duration_s: float = 2.0, **scenario: Any
+) -> float:
     """Frequency that fills the shipped tube best by records."""
     amplitude = {
         "acceleration": {"acceleration_g": 1.5},
         "displacement": {"displacement_m": 1.5e-4},
     }
-    stage = {"frequency_hz": 50, "duration_s": 1, "hold": hold, **amplitude[hold]}
+    stage = {"frequency_hz": 50, "duration_s": duration_s, "hold": hold, **amplitude[hold]}
     study = {
         "based_on": "tube", "scenario": {"vibration": [stage], **scenario},
         "sweep": {"keys": {"vibration.0.frequency_hz": values}},
@@ -83,6 +85,8 @@ def test_what_the_table_keeps_decides_which_frequency_is_foretold(tmp_path: Path
 WIDE = {"kind": "tube", "name": "tube", "diameter_m": 0.05, "length_m": 0.05, "left_end_x_m": 0.07,
         "wall_thickness_m": 0.003, "axis_height_m": 0.035, "closed_end": "right"}  # fmt: skip
 
+ROOF = {"kind": "plate", "name": "roof", "centre_m": [0.03, 0.06], "size_m": [0.02, 0.003]}
+
 
 @pytest.mark.parametrize(
     "beyond",
@@ -90,6 +94,9 @@ WIDE = {"kind": "tube", "name": "tube", "diameter_m": 0.05, "length_m": 0.05, "l
         {"contact": {"wave_speed_m_s": 400}},
         {"fill": {"layers": [{"height_m": 0.1, "repeat": 5}]}, "box": {"height_m": 0.6}},
         {"obstacles": [WIDE]},
+        {"obstacles": [WIDE | {"diameter_m": 0.024}, ROOF]},
+        {"sand": {"size_scale": 9}},
+        {"duration_s": 0.6},
     ],
 )
 def test_records_foretell_nothing_beyond_their_range(tmp_path: Path, beyond: Any) -> None:
