@@ -149,7 +149,7 @@ def _beyond(scenario: OwnDeck, series: pd.DataFrame) -> str:
         return ""
     lasts_s = float(series["time_s"].iloc[-1] - series["time_s"].iloc[0])
     windows = {
-        f"measures.{name}.{key}": value
+        ".".join(("measures", name, key)): value
         for name, taken in scenario.taken.items()
         for key, value in (("from_s", taken.from_s), ("over_last_s", taken.over_last_s))
         if value is not None and value > lasts_s * (1.0 + 1e-6)  # round-off
