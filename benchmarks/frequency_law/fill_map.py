@@ -35,7 +35,8 @@ def map_text(settings: pd.DataFrame, error: float) -> str:
         "# python -m benchmarks.frequency_law; do not edit.",
         f"error: {error:.3f}  # root mean square where a curve is foretold by the others",
         "range: {tube_width_m: [0.016, 0.036], bed_depth_m: [0.08, 0.34], "
-        "wave_speed_m_s: [60, 260], size_scale: [2.7, 6], duration_s: [1.5, 3]}",
+        "wave_speed_m_s: [60, 260], size_scale: [4, 6], duration_s: [1.5, 3]}"
+        "  # of the records; times between which the top stays, tube_law_screen",
         *(f"{name}: [{', '.join(f'{x:.4g}' for x in points)}]" for name, points in axes.items()),
         "fill:  # a row a velocity",
         *(f"  - [{row}]" for row in rows),

@@ -340,12 +340,12 @@ class AnswerWords:
         return goal is not None and all(abs(s.mean - goal.value) > s.ci_half_width for s in others)
 
     @property
-    def effects(self) -> str:
+    def effects(self) -> list[str]:
         """Of several swept keys those that make a difference, averaged over the others."""
         keys = self.answer.asked.keys
         names = distinct_names(keys)
-        told = [it for it in main_effects(self.answer.verdict, keys) if it.apart.separated]
-        return listed([names[it.key] for it in told])
+        effects = main_effects(self.answer.verdict, keys)
+        return [names[it.key] for it in effects if it.apart.separated]
 
     @property
     def no_chance(self) -> str:

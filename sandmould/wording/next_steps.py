@@ -153,10 +153,12 @@ def _chance(study: Study, answer: Answer) -> Iterable[NextStep]:
 
 def _also_reach(answer: Answer) -> Iterable[NextStep]:
     """More runs of settings that reach the target on average, where others are shown to."""
-    needed = {s: runs for s in answer.unsure if 0 < (runs := answer.runs_to_reach(s)) <= WORTH}
+    needed = [(answer.runs_to_reach(s), s) for s in answer.unsure]
+    needed = [(runs, s) for runs, s in needed if 0 < runs <= WORTH]
     if needed:
-        runs, planned = max(needed.values()), max(s.planned for s in needed)
-        names = listed([s.label for s in needed])
+        runs = max(runs for runs, _ in needed)
+        planned = max(s.planned for _, s in needed)
+        names = listed([s.label for _, s in needed])
         yield step("reach_too", f"replicates: {planned + runs}", runs=runs, settings=names)
 
 

@@ -151,8 +151,8 @@ def test_a_killed_run_goes_on_from_its_restart_file(tmp_path: Path) -> None:
     # the springs give.
     assert 0.00595 < series["log_v_height"].iloc[-1] < 0.006
     cost = read_costs([folder]).rows.iloc[0]
-    # Of both attempts; the first wrote a restart file some steps beyond what its log holds.
-    assert 50000 < cost["steps"] < 120000
+    # Of both attempts: of the first as far as its log tells, or to where the second begins.
+    assert 60000 <= cost["steps"] < 120000
     assert (folder / "output" / "grains.dump").is_file()
     assert not (folder / "work").exists()
     measure_run(folder)

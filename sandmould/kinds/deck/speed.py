@@ -213,14 +213,14 @@ def _failure(scenario: OwnDeck, folder: Path, status: int, results: Path) -> Pro
     """Say why a pilot failed, and keep its log."""
     why = folder / "why.txt"
     said = why.read_text(encoding="utf-8") if why.exists() else f"its process ended with {status}"
-    told = said.rstrip(". ")
+    said = said.rstrip(". ")
     logs = [path for path in (folder / "work" / "engine_1.log", folder / "log") if path.exists()]
     kept = results / FAILED_LOG
     results.mkdir(parents=True, exist_ok=True)
     shutil.copy(logs[0], kept)
     return Problem(
         "scenario.template", scenario.template, "a deck that runs",
-        sentence=f"{_of_values(scenario)} stopped in a pilot run, so none was begun. {told}. Its "
+        sentence=f"{_of_values(scenario)} stopped in a pilot run, so none was begun. {said}. Its "
         f"log: {display_path(kept)}",
     )  # fmt: skip
 

@@ -281,9 +281,23 @@ def test_a_run_that_went_on_has_each_step_once(tmp_path: Path) -> None:
         "  Step Time v_speed\n 50 0.5 1.6\n 150 1.5 3\n"
         "Loop time of 2.0 on 1 procs for 100 steps with 10 atoms\n"
     )
-    table = read_thermo([tmp_path / "one.log", tmp_path / "two.log"]).table
-    assert table["Step"].tolist() == [0, 50, 150]
-    assert table["v_speed"].tolist() == [0, 1.6, 3]
+    thermo = read_thermo([tmp_path / "one.log", tmp_path / "two.log"])
+    assert thermo.table["Step"].tolist() == [0, 50, 150]
+    assert thermo.table["v_speed"].tolist() == [0, 1.6, 3]
+
+
+def test_an_attempt_counts_at_least_to_where_the_next_one_begins(tmp_path: Path) -> None:
+    (tmp_path / "one.log").write_text("Step Time\n 0 0.0\n 50 0.5\n")
+    two = "Step Time\n {} 0.7\n 150 1.5\nLoop time of 2.0 on 1 procs for {} steps with 10 atoms\n"
+    for begins, steps in ((70, 150), (30, 170)):
+        (tmp_path / "two.log").write_text(two.format(begins, 150 - begins))
+        assert read_thermo([tmp_path / "one.log", tmp_path / "two.log"]).steps == steps
+
+
+@pytest.mark.parametrize("step", ["1e999", "nan"])
+def test_a_row_whose_step_is_no_number_is_passed_over(step: str, tmp_path: Path) -> None:
+    (tmp_path / "one.log").write_text(f"Step Time\n 0 0.0\n {step} 0.5\n 50 0.5\n")
+    assert read_thermo([tmp_path / "one.log"]).table["Step"].tolist() == [0, 50]
 
 
 def test_a_log_without_a_table_is_empty(tmp_path: Path) -> None:

@@ -10,6 +10,7 @@ import pytest
 
 from sandmould.bad_input import BadInputError
 from sandmould.kinds.deck import speed
+from sandmould.scenario.own_deck import Taken
 from sandmould.study.plan import announcement
 from sandmould.study.plan.announcement import announce, measure_speeds, stored_speeds
 from sandmould.study.plan.build_plan import Plan, open_plan
@@ -56,6 +57,16 @@ def test_a_long_deck_is_foretold_by_its_steps(tmp_path: Path) -> None:
     assert core_s > 3600.0
     without = scenario.model_copy(update={"steps": None})
     assert speed.pilot(without, tmp_path, pilot_s=0.5)[0] is None
+
+
+def test_windows_beyond_the_run_of_a_pilot_are_told(tmp_path: Path) -> None:
+    plan = short(tmp_path, 2000)
+    measures = {"late_m_s": Taken(of="v_speed", take="mean", from_s=500.0),
+                "speed_m_s": Taken(of="v_speed", take="mean", over_last_s=1e-3)}  # fmt: skip
+    scenario = plan.runs[0].scenario.model_copy(update={"measures": measures})
+    _, said = speed.pilot(scenario, tmp_path)
+    assert "s, and measures.late_m_s.from_s is 500 s." in said
+    assert "over_last_s" not in said
 
 
 def test_a_deck_of_several_ranks_has_no_pilot(tmp_path: Path) -> None:

@@ -95,6 +95,32 @@ def test_a_space_that_stays_empty_beside_another_is_to_be_turned_and_suits_nothi
     assert [each.text for each in answer_steps(study, asked_first)] == turned
 
 
+@pytest.mark.parametrize(
+    ("fractions", "beyond"),
+    [
+        ({25: (0.40, 0.60), 50: (0.50, 0.55), 75: (0.42, 0.68)}, False),  # chance 0.8
+        ({25: (0.40, 0.50), 50: (0.50, 0.55), 75: (0.52, 0.62)}, True),
+        ({25: (0.40,), 50: (0.50,), 75: (0.52,)}, True),  # nothing tells chance
+    ],
+)
+def test_a_key_is_advised_beyond_its_sweep_where_the_measure_goes_one_way(
+    fractions: dict[int, tuple[float, ...]], beyond: bool
+) -> None:
+    found = answered.answered(table(HZ, solid_fraction=fractions), "solid_fraction", [HZ])
+    assert bool(found.ends) is beyond
+
+
+def test_settings_that_scatter_unlike_each_other_are_compared_by_their_own_scatter() -> None:
+    calm = {4: (10.0, 12.0, 11.0), 8: (20.0, 22.0, 21.0), 12: (100.0, 190.0, 140.0)}
+    summary = table(HZ, flow=calm)
+    summary["seed"] = range(len(summary))
+    found = answered.answered(summary, "flow", [HZ], "smaller")
+    assert found.verdict.spread is not None
+    assert found.verdict.spread.are_unlike
+    nearest = found.verdict.comparisons[0]
+    assert (nearest.other, nearest.separated) == ("8 Hz", True)
+
+
 def test_finer_grains_are_advised_for_the_narrowest_space_that_is_judged() -> None:
     found = answered.two_cavities()
     judged = [filled_space(a.asked.measure).replace("_", " ") for a in (found, *found.beside)]

@@ -5,10 +5,12 @@ from __future__ import annotations
 from dataclasses import replace
 from pathlib import Path
 
+import pandas as pd
 import pytest
 
 from sandmould.kinds.sand.kind import SandStudy
-from sandmould.statistics.answer import Answer, Decided
+from sandmould.scenario.drive import BoxDrive
+from sandmould.statistics.answer import Answer, Asked, Decided
 from sandmould.statistics.config import Better, Goal
 from sandmould.statistics.decision import Evidence, decide
 from sandmould.wording.answer import detail_sentences, first_sentence, limit_sentences
@@ -65,6 +67,15 @@ def test_full_is_said_where_it_was_asked_alone(name: str) -> None:
          "fits; 2 runs each do not show it."),
         ({30: (0.7,), 45: (0.96,)}, "By one run each 45 Hz fills the pocket, with 96 % of what "
          "fits: how much of that is chance is unknown."),
+        ({30: (0.7,), 45: (0.6,), 60: (0.5,)}, "By one run each no frequency from 30 Hz to 60 Hz "
+         "fills the pocket: the best mean, 70 % of what fits, is at 30 Hz. A lower frequency may "
+         "change that."),
+        ({30: (0.97, 0.98, 0.99), 45: (0.96, 0.97, 0.98)}, "30 Hz fills the pocket, with 98.0 ± "
+         "2.5 % of what fits; 45 Hz does on average, which 3 runs each do not show."),
+        ({30: (0.97, 0.971, 0.972), 45: (0.98, 0.981, 0.982)}, "30 Hz and 45 Hz fill the pocket "
+         "(95 % of what fits, or more)."),
+        ({30: (0.97, 0.971, 0.972), 45: (0.98,)}, "30 Hz fills the pocket, with 97.10 ± 0.25 % of "
+         "what fits; 45 Hz does in one run."),
         ({30: (0.7, 0.71, 0.7), 45: (0.965, 0.97, 0.975)}, "45 Hz alone fills the pocket, with "
          "97.0 ± 1.2 % of what fits."),
     ],
@@ -104,6 +115,58 @@ def test_what_sizes_tell_is_held_against_a_target(value: float, said: str) -> No
     goal = Goal(answer.asked.measure, value)
     told = replace(answer, asked=replace(answer.asked, goal=goal, better="smaller"))
     assert said in first_sentence(told)
+
+
+def test_more_runs_are_advised_for_what_reaches_a_target_on_average() -> None:
+    summary = answered.table(answered.HZ, **{answered.POCKET: {
+        30: (0.97, 0.98, 0.99), 45: (0.96, 0.97, 0.98),
+    }})  # fmt: skip
+    (step,) = steps(answered.answered(summary, answered.POCKET, [answered.HZ]))
+    assert step.text.endswith("that would tell whether 45 Hz reaches the target, too.")
+    assert step.line == "replicates: 5"
+
+
+def test_how_long_it_shakes_is_told_once_where_that_is_swept() -> None:
+    key = "vibration.0.duration_s"
+    summary = answered.table(key, **{answered.POCKET: {0.5: (0.97, 0.971), 1.0: (0.98, 0.981)}})
+    curves = answered.over_a_second(summary, 0.0, answered.POCKET)
+    drives = {"0.5 s": BoxDrive(45, 4e-4), "1 s": BoxDrive(45, 4e-4)}
+    said = first_sentence(
+        answered.answered(summary, answered.POCKET, [key], curves=curves, drives=drives)
+    )
+    assert said.strip().endswith("fill the pocket (95 % of what fits, or more).")
+
+
+def test_a_margin_of_what_is_no_share_is_told_however_wide() -> None:
+    summary = answered.table(
+        answered.HZ, height_mm={30: (440, 450), 45: (460, 470), 60: (480, 490)}
+    )
+    asked = Asked("height_mm", "larger", (answered.HZ,), Goal("height_mm", 900.0))
+    assert "wider than" not in first_sentence(decide(asked, Evidence(summary)))
+
+
+def test_a_grid_says_which_key_makes_a_difference_where_single_settings_do_not() -> None:
+    rows = [
+        {"run": f"r{at}{of}{n}", "a": at, "b": of, "replicate": n, "seed": 10 * n + at,
+         "outcome_code": 0, "flow": 10.0 * at + noise}
+        for at in (1, 2) for of in (1, 2)
+        for n, noise in enumerate((0.0, 9.0, -9.0) if of == 1 else (-8.0, 1.0, 7.0))
+    ]  # fmt: skip
+    summary = pd.DataFrame(rows)
+    for strength, told in ((1.0, False), (1.6, True)):
+        wider = summary.assign(flow=summary["flow"] * 1.0 + 10.0 * (strength - 1.0) * summary["a"])
+        said = first_sentence(answered.answered(wider, "flow", ["a", "b"], "neither"))
+        assert ("averaged over the rest, a makes a difference" in said) is told
+
+
+def test_a_finer_step_is_advised_by_what_sizes_do_and_not_by_chance() -> None:
+    key = "values.step_s"
+    for spread, advised in ((0.1, True), (40.0, False)):
+        flows = {4e-5: 300.0, 2e-5: 340.0, 1e-5: 320.0}
+        values = {h: (mean - spread, mean, mean + spread) for h, mean in flows.items()}
+        found = answered.answered(answered.table(key, flow=values), "flow", [key])
+        lines = [each.line for each in steps(found)]
+        assert lines == ["sweep: {keys: {values.step_s: [4e-05, 2e-05, 1e-05, 5e-06]}}"] * advised
 
 
 def test_where_nothing_else_is_left_finer_grains_are() -> None:

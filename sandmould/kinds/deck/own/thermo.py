@@ -29,7 +29,7 @@ class Thermo:
     """At the end of the last ``run``."""
     steps: int
     """Of all runs, those that were done again included, and one that was cut short as far as it is
-    logged."""
+    logged, or to where the next attempt begins: a log is written some steps late."""
     grain_steps: float
     """Steps of each ``run`` that ended, times grains at its end."""
     loop_s: float
@@ -46,6 +46,7 @@ def read_thermo(logs: Sequence[Path]) -> Thermo:
     together = pd.DataFrame(columns=[STEP])
     grain_steps = loop_s = 0.0
     every_step = last_grains = 0
+    reached = math.inf
     for log in logs:
         text = log.read_text(encoding="utf-8", errors="replace")
         ended = 0
@@ -58,8 +59,11 @@ def read_thermo(logs: Sequence[Path]) -> Thermo:
         table = pd.DataFrame(list(_rows(text)))
         if table.empty:
             continue
+        every_step += int(max(0.0, table[STEP].iloc[0] - reached))
+        reached = math.inf
         if cut_short := [row[STEP] for row in _rows(text[ended:])]:
-            every_step += int(cut_short[-1] - cut_short[0])
+            reached = cut_short[-1]
+            every_step += int(reached - cut_short[0])
         together = together[together[STEP] < table[STEP].iloc[0]]
         together = table if together.empty else pd.concat([together, table], ignore_index=True)
     return Thermo(together, last_grains, every_step, grain_steps, loop_s)
