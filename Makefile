@@ -10,7 +10,7 @@ MINUTES ?= 60
 BIN := .venv/bin
 INSTALLED := .venv/installed
 
-TWINS := engine_twins damping_forms contact_readings rolling_axes frames
+TWINS := engine_twins rolling_axes
 
 LINT := lint-style lint-types lint-imports lint-rules lint-names
 

@@ -1,7 +1,7 @@
-"""The pages on studies whose settings should agree, from the committed results.
+"""The page on engines that should agree, from the committed results.
 
-``python -m benchmarks.agreement`` writes docs/engine_twins.md and
-docs/one_difference.md; ``make twins`` computes and records the studies of the first before.
+``python -m benchmarks.agreement`` writes docs/engine_twins.md; ``make twins`` computes and records
+its study before.
 """
 
 from __future__ import annotations
@@ -14,7 +14,6 @@ BENCHMARK = Benchmark(
     __doc__,
     pages={
         "engine_twins.md": lambda results: engine_twins.page(),
-        "one_difference.md": lambda results: engine_twins.one_difference(),
     },
 )
 

@@ -1,4 +1,4 @@
-"""The pages on how far engines and choices of the model agree, from the committed results."""
+"""The page on how far engines agree, from the committed results."""
 
 from __future__ import annotations
 
@@ -11,8 +11,6 @@ from sandmould.runs.formatting import name_of, number, seconds
 from sandmould.statistics.agreement import interval_text
 
 TWINS = "engine_twins"
-EFFECTS = ("damping_forms", "contact_readings", "rolling_axes", "frames")
-"""Studies that measure one difference at a time, by the same machinery."""
 
 
 def page(records: Path = RECORDS) -> str:
@@ -25,17 +23,6 @@ def page(records: Path = RECORDS) -> str:
     """
     (twins,) = read_all(records, (TWINS,))
     return _render("engine_twins.md.j2", twins=twins)
-
-
-def one_difference(records: Path = RECORDS) -> str:
-    """Write the page on what a choice of the model does.
-
-    Raises
-    ------
-    SystemExit
-        Naming the studies that have no record yet.
-    """
-    return _render("one_difference.md.j2", effects=read_all(records, EFFECTS))
 
 
 def _render(template: str, **values: object) -> str:

@@ -13,7 +13,7 @@ from sandmould import ROOT
 ANGLE, FILL = "heap_angle_deg", "tube_fill_fraction"
 ANGLE_ERROR, FILL_ERROR = "error of the angle of repose, degrees", "error of the fill, %"
 SIMULATED = "core time of a simulated second, s"
-STEP, ENGINE, SCALE = "time_step.fraction", "engine.name", "sand.size_scale"
+ENGINE, SCALE = "engine.name", "sand.size_scale"
 THICKNESS, FORM = "sand.disc_thickness_m", "background_damping.form"
 SPEED, HZ = "contact.wave_speed_m_s", "vibration.0.frequency_hz"
 
@@ -48,13 +48,11 @@ def impacts(title: str, named: Callable[[dict[str, Any]], str]) -> Panel:
 
 
 def engines_and_step() -> Method:
-    """Three engines over the step, on an impact, a heap and a tube."""
-    heap, tube = Record("repose_time_step", ANGLE), Record("engine_twins", FILL)
-    steps = heap.points([STEP], heap.least(STEP), lambda key: ("reference", f"{key[0]:g}"))
+    """Three engines over the step, on an impact and a tube."""
+    tube = Record("engine_twins", FILL)
     engines = tube.points([ENGINE], tube.where(ENGINE, "reference"), lambda key: (key[0], ""), 0.01)
     panels = [
         impacts("one impact", lambda row: row["engine"] * (row["dashpot"] == "corrected")),
-        Panel("heap of 2 676 discs, over the step", ANGLE_ERROR, steps, [heap.page]),
         Panel("tube, the same step", FILL_ERROR, engines, [tube.page]),
     ]
     return Method("engines_and_step", panels)

@@ -24,6 +24,7 @@ Key = tuple[Model, str]
 """A key by the class that declares it: those that inherit it share its study."""
 PHYSICS = {
     "Scenario.measure_at_rest": "tests/verification/cases/shaking.py",
+    "Scenario.frame": "tests/verification/cases/shaking.py",
     "Plate.angle_deg": "tests/verification/cases/incline.py",
     "Contact.dashpot": "tests/verification/cases/restitution.py",
     "Contact.slip_normal": "tests/verification/test_three_grains.py",

@@ -36,7 +36,7 @@ def test_it_builds_strictly_and_loads_nothing_from_the_network(tmp_path: Path) -
     assert loading == []
     assert 'rel="stylesheet"' in (tmp_path / "site/index.html").read_text(encoding="utf-8")
     # A page that is called README.md may be taken for the head of its section, and vanish.
-    assert "Do moving walls and a body force" in (tmp_path / "site/faq.html").read_text("utf-8")
+    assert "Does resistance to twist change" in (tmp_path / "site/faq.html").read_text("utf-8")
     # A file of the repository that a page links to is in the site.
     assert (tmp_path / "site/files/profiles/slurm/config.yaml").is_file()
 

@@ -26,7 +26,7 @@ CASES: list[tuple[str, str, Any, Any]] = [
     ("tube_quick", "objective.at_vibration_s", None, 0.2),
     ("tube_quick", "equivalence.confidence", 0.9, 0.95),
     ("tube_certified", "certificate.ratio", 1.41, 2),
-    ("repose_small", "scenario.discharge.settling", {"longest_s": 20}, {"longest_s": 9}),
+    ("repose_scale", "scenario.discharge.settling", {"longest_s": 20}, {"longest_s": 9}),
     ("tank_small", "certificate", {"controls": []}, {"controls": ["hold"]}),
     ("tank_small", "material", None, "rojek_2004"),
     ("tank_small", "replicates", 1, 2),
@@ -97,7 +97,7 @@ def test_kinds_that_are_no_more_are_told(tmp_path: Path) -> None:
 
 def test_a_removed_key_cannot_be_swept(tmp_path: Path) -> None:
     keys = {"discharge.settling.longest_s": [5, 9]}
-    line = refusal(tmp_path, "repose_small", "sweep.keys", {"sand.size_scale": [1]} | keys)
+    line = refusal(tmp_path, "repose_scale", "sweep.keys", {"sand.size_scale": [1]} | keys)
     assert "sweep.keys.discharge.settling.longest_s = [5, 9]" in line
     assert removed_keys()["scenario.discharge.settling"][1] in line
 
