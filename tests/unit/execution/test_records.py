@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import json
 import math
-import subprocess
 import zipfile
 from pathlib import Path
 
@@ -181,19 +180,19 @@ def test_stale_records_are_made_again_the_cheapest_first_and_a_failure_stops_no_
     monkeypatch.setattr(records, "MOST_S", 0.5 * records.MOST_S)
     computed, kept = [], []
 
-    def compute(study: str) -> None:
-        computed.append(Path(study).stem)
-        if "plates" in study:
-            raise subprocess.CalledProcessError(1, study)
+    def keep(study: Path, results: Path) -> None:
+        if "plates" in study.stem:
+            raise SystemExit("3 runs are missing")
+        kept.append(study.stem)
 
-    monkeypatch.setattr(records, "_compute", compute)
-    monkeypatch.setattr(records, "record", lambda study, results: kept.append(study.stem))
+    monkeypatch.setattr(records, "_compute", lambda study: computed.append(Path(study).stem))
+    monkeypatch.setattr(records, "record", keep)
     assert records.main(["renew"]) == 1
     assert computed == ["plates_small", "tube_demo"]
     assert kept == ["tube_demo"]
     said = capsys.readouterr().out
     assert "bracket_paper is left: it takes about" in said
-    assert "plates_small has no new record" in said
+    assert "plates_small has no new record: 3 runs are missing" in said
 
 
 def test_unfinished_study_is_not_recorded(tmp_path: Path) -> None:
