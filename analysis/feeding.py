@@ -60,7 +60,7 @@ class Feeding:
     cut_off: tuple[CutOff, ...]
     """The largest first."""
     cut_off_fraction: float
-    """Of the casting without risers."""
+    """Of the casting without risers; NaN where some of that still flows."""
     low: Region | None
     """The largest region with a Niyama value below ``NIYAMA_LOW``, risers apart."""
     low_fraction: float
@@ -81,6 +81,8 @@ def feeding(fields: Mapping[str, Any]) -> Feeding | None:
     parts = cut_off(place_m, size_m, volume_m3, flows_s, riser)
     whole_m3 = float(volume_m3[~riser].sum())
     lost = sum(part.region.volume_m3 for part in parts) / whole_m3
+    if np.isnan(flows_s[~riser]).any():
+        lost = math.nan
     low = np.flatnonzero((niyama < NIYAMA_LOW) & ~riser)
     if not len(low):
         share = 0.0 if np.isfinite(niyama).any() else math.nan

@@ -12,7 +12,7 @@ from matplotlib.figure import Figure
 from matplotlib.layout_engine import ConstrainedLayoutEngine
 from numpy.typing import NDArray
 
-from sandmould.analysis.feeding import NIYAMA_LOW, CutOff, Feeding, feeding
+from sandmould.analysis.feeding import NIYAMA_LOW, CutOff, Feeding, Region, feeding, region_of
 from sandmould.analysis.freezing import Freezing, freezing
 from sandmould.analysis.freezing_plots import (
     DistanceM,
@@ -99,9 +99,12 @@ def cast_fields(folder: Path, scenario: Solidification) -> CastFields:
         like=like,
         above_m=above_m,
         is_solid=math.isfinite(frozen.solidification_time_s),
-        has_risers=bool(scenario.risers),
+        has_risers=len(scenario.risers),
+        read_at=scenario.read_at_solid_fraction,
+        low_is_all=fed is not None and fed.low is not None and _is_all(fed.low, fields),
         reads=reads,
         limit=1e-3 * NIYAMA_LOW,
+        infinity=math.inf,
         flat=scenario.dimensions == 2,
     )
     tables = (_spots(frozen), *([_cut_off(fed, scenario.dimensions, bool(risers))] if fed else []))
@@ -123,6 +126,15 @@ def _of_part(fields: Mapping[str, Any], scenario: Solidification) -> Freezing | 
     if not scenario.risers or not own.any():
         return None
     return freezing(fields["position_m"][own], fields["frozen_s"][own], scenario.hot_spot_reach_m)
+
+
+def _is_all(region: Region, fields: Mapping[str, Any]) -> bool:
+    """Whether a region reaches as far as the part does, but for an element."""
+    own = fields["melts"] & ~fields["riser"]
+    place_m, size_m = fields["position_m"][own], fields["size_m"][own]
+    whole = region_of(place_m, size_m, fields["volume_m3"][own])
+    off_m = np.abs([region.low_m - whole.low_m, region.high_m - whole.high_m]).max()
+    return bool(off_m <= 1.01 * size_m.max())
 
 
 def _above_risers_m(fields: Mapping[str, Any]) -> float:

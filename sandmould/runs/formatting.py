@@ -6,6 +6,7 @@ import json
 import math
 import re
 from collections.abc import Iterable, Mapping, Sequence
+from contextlib import suppress
 from numbers import Real
 from typing import Any, TypeGuard
 
@@ -34,6 +35,8 @@ _NAMES = {
     "cut_off_fraction": "share of the part that is cut off from the risers",
     "low_niyama_fraction": "share of the part below Niyama's limit",
     "bed_height_m": "bed height",
+    "low_m": "lower corner",
+    "high_m": "upper corner",
     "displacement_m": "amplitude",
     "drive_displacement_m": "amplitude of the box",
     "drive_velocity_m_s": "velocity of the box",
@@ -87,7 +90,7 @@ _PREFIXED = ("Pa", "N/m")
 """Units in which moduli and stiffnesses of millions are common."""
 
 
-_LONGEST_LIST = 40
+_LONGEST_LIST, _MOST_KINDS = 40, 3
 """Letters of a list that is written out."""
 _MOST_PLACES = 6
 """After the point, beyond which a small number is shown with an exponent."""
@@ -121,7 +124,7 @@ def name_of(key: str) -> str:
     >>> name_of("vibration.0.frequency_hz")
     'frequency'
     >>> name_of("shapes.1.high_m.2")
-    'high z'
+    'upper corner z'
     """
     head, _, last = key.rpartition(".")
     if head and last.isdigit():
@@ -241,7 +244,9 @@ def is_number(value: Any) -> TypeGuard[float]:
 
 def mark(value: Any) -> str:
     """Four letters and digits that stand for a value too long to be written."""
-    text = value if isinstance(value, str) else json.dumps(value, sort_keys=True)
+    text = value if isinstance(value, str) else json.dumps(value)
+    with suppress(ValueError):
+        text = json.dumps(json.loads(text), sort_keys=True)
     return digest(text)[:4]
 
 
@@ -251,7 +256,7 @@ def _text(value: Any) -> str:
     if text[:1] in ("[", "{"):
         said = _sections_text(text)
         shown = said if 0 < len(said) <= _LONGEST_LIST else text
-        return shown if len(shown) <= _LONGEST_LIST else f"no. {mark(text)}"
+        return shown if len(shown) <= _LONGEST_LIST else f"{_outline(text)} ({mark(text)})"
     return text.replace("_", " ")
 
 
@@ -267,6 +272,21 @@ def _sections_text(text: str) -> str:
     if any(isinstance(value, list | dict) for value in values):
         return ""
     return " + ".join(map(_section_text, sections))
+
+
+def _outline(text: str) -> str:
+    """What a long list has in it: names or kinds of its sections, else how many values."""
+    try:
+        value = json.loads(text)
+    except ValueError:
+        return "no."
+    sections = value if isinstance(value, list) else [value]
+    dicts = [each for each in sections if isinstance(each, dict)]
+    kinds = [str(each.get("name") or each.get("kind") or "") for each in dicts]
+    if not kinds or not all(kinds):
+        return f"{len(sections)} values"
+    more = len(kinds) - _MOST_KINDS
+    return " + ".join(kinds[:_MOST_KINDS]) + (f" + {more} more" if more > 0 else "")
 
 
 def _section_text(section: Mapping[str, Any]) -> str:

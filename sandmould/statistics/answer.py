@@ -116,6 +116,8 @@ class Answer:
     """Largest share of its foam that was above its crushing strength in a run of that setting."""
     left_out: Mapping[str, int] = field(default_factory=dict)
     """Runs that do not count, by reason."""
+    no_value: str = ""
+    """What the first run without a value says of itself."""
     one_way: int = 0
     """Runs in which the sand never felt the pattern give way."""
     planned: int = 0

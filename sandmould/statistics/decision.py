@@ -23,7 +23,12 @@ from sandmould.statistics.answer import (
     SweepEnd,
 )
 from sandmould.statistics.config import Aim, Goal
-from sandmould.statistics.evidence import left_out_counts, one_way_runs, usable_values
+from sandmould.statistics.evidence import (
+    left_out_counts,
+    one_way_runs,
+    usable_values,
+    why_no_value,
+)
 from sandmould.statistics.main_effects import has_trend
 from sandmould.statistics.over_time import passage_of, reached_s
 from sandmould.statistics.refining import Refining, refining_of, resolution_among
@@ -83,6 +88,7 @@ def _decide_one(asked: Asked, evidence: Evidence) -> Answer:
     answer = Answer(
         asked, Decided.NO_RESULT, verdict,
         left_out=left_out_counts(evidence.summary, asked.measure),
+        no_value=why_no_value(evidence.summary, asked.measure),
         one_way=one_way_runs(evidence.summary), planned=len(evidence.summary),
         drives=evidence.drives, stand_ins=evidence.stand_ins,
     )  # fmt: skip
@@ -92,8 +98,11 @@ def _decide_one(asked: Asked, evidence: Evidence) -> Answer:
     if refining is not None:
         return replace(answer, decided=Decided.FINEST, refining=refining)
     if len(answer.used) > 1 and _is_same(summary, asked, answer.used):
-        is_run = _are_same_runs(summary, asked)
-        return replace(answer, decided=Decided.NO_EFFECT if is_run else Decided.EQUAL)
+        if _are_same_runs(summary, asked):
+            return replace(answer, decided=Decided.NO_EFFECT)
+        if asked.better != "neither" and asked.goal and asked.goal.measure in summary:
+            answer = _with_target(answer, asked.goal, evidence, summary)
+        return replace(answer, decided=Decided.EQUAL)
     if asked.better == "neither":
         if len(answer.used) > 1:
             return replace(answer, decided=Decided.RANGE)

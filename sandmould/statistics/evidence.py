@@ -14,7 +14,7 @@ from collections.abc import Mapping
 import numpy as np
 import pandas as pd
 
-from sandmould.runs.columns import LOOP, LOOP_ERROR, finished
+from sandmould.runs.columns import DETAIL, LOOP, LOOP_ERROR, finished
 
 UNTRUSTED = ("lags", "cycles", "diverged")
 """States of a loop whose shape is no answer."""
@@ -61,6 +61,14 @@ def left_out_counts(summary: pd.DataFrame, measure: str) -> Mapping[str, int]:
     """How many runs are left out, by reason."""
     count = Counter(left_out(summary, measure))
     return {why: count[why] for why in (NOT_FINISHED, *UNTRUSTED, NO_VALUE) if count[why]}
+
+
+def why_no_value(summary: pd.DataFrame, measure: str) -> str:
+    """What the first run that finished without a value says of itself; empty for nothing."""
+    if DETAIL not in summary:
+        return ""
+    details = summary.loc[left_out(summary, measure) == NO_VALUE, DETAIL].dropna()
+    return next((text for text in details.astype(str) if text), "")
 
 
 def usable_values(summary: pd.DataFrame, measure: str) -> pd.Series[float]:

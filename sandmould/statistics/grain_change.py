@@ -64,7 +64,8 @@ class GrainChange:
         """Band in which the mean with grains ``FACTOR`` times finer should lie.
 
         A change that goes as the size to the power p is f^-p times as large from the study's size
-        to the finer one as it is from the coarser to the study's.
+        to the finer one as it is from the coarser to the study's. Shares and largest distances are
+        never below 0.
         """
         ends = []
         for order in ORDERS:
@@ -72,7 +73,8 @@ class GrainChange:
             mean = float(self.own.mean()) - less * self.change
             half = self._half_width(1.0 + less, less, FORETOLD)
             ends += [mean - half, mean + half]
-        return min(ends), max(ends)
+        is_amount = self.measure.endswith("_fraction") or "_largest" in self.measure
+        return max(min(ends), 0.0) if is_amount else min(ends), max(ends)
 
     def _half_width(self, of_own: float, of_coarser: float, confidence: float) -> float:
         """Half width of the interval of a combination of both means, with one spread for both."""

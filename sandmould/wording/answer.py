@@ -270,7 +270,8 @@ class AnswerWords:
     @property
     def reasons(self) -> str:
         """Why runs do not count."""
-        return reasons_text(self.answer.left_out)
+        told = reasons_text(self.answer.left_out)
+        return f"{told} ({self.answer.no_value})" if self.answer.no_value else told
 
     @property
     def lasts(self) -> str:

@@ -21,7 +21,7 @@ from sandmould.report.cast_fields import cast_fields, cast_scene
 from sandmould.report.kinds.kind import Findings, FirstPicture, KindPages, KindReport
 from sandmould.report.tables import Cell, Column, Table
 from sandmould.report.time_series import curve_figures, measure_curves
-from sandmould.runs.columns import CPU_S, RUN, SOLIDIFICATION_TIME_S, TIME_S, finished
+from sandmould.runs.columns import CPU_S, DETAIL, RUN, SOLIDIFICATION_TIME_S, TIME_S, finished
 from sandmould.runs.formatting import is_number, listed, name_of, number, seconds, setting_text
 from sandmould.runs.templates import Note, notes, worded
 from sandmould.scenario.casting.solidification import Solidification
@@ -31,7 +31,7 @@ from sandmould.statistics.refining import resolution_among
 from sandmould.statistics.verdict import rank_runs
 from sandmould.study.collect import Collected
 from sandmould.wording.answer import AnswerWords
-from sandmould.wording.next_steps import NextStep
+from sandmould.wording.next_steps import NextStep, step
 
 NEAR_PERCENT = 5.0
 """Off the reference's solidification time: as near as the answer takes for good."""
@@ -77,6 +77,8 @@ def _pages(findings: Findings[Solidification], film_budget_bytes: int) -> KindPa
     cheapest = "" if study.seeks_best else _cheapest(errors, reference, collected)
     is_one = len(said) > 1 and not keys and not study.seeks_best
     first_said = [text for text in said if text.partition(":")[0] in _FIRST]
+    if keys:
+        said = _said_of(collected.summary, run, keys, said)
     stand_ins = _stand_ins(findings.answer.stand_ins)
     shown = {
         "pictured_run": run,
@@ -109,14 +111,36 @@ def _pages(findings: Findings[Solidification], film_budget_bytes: int) -> KindPa
             has_stand_ins=bool(stand_ins),
             dimensions=scenario.dimensions,
         ),
-        steps=_steps(scenario, keys, bool(reference), fed_by),
+        steps=(*_longer(collected.summary), *_steps(scenario, keys, bool(reference), fed_by)),
     )
+
+
+def _said_of(
+    summary: pd.DataFrame, run: str, keys: Sequence[str], said: Sequence[str]
+) -> tuple[str, ...]:
+    """Findings, the first with the setting of the one run that they are of."""
+    row = summary[summary[RUN].astype(str) == run]
+    if row.empty:
+        return tuple(said)
+    label = setting_text({key: row.iloc[0][key] for key in keys})
+    name, colon, rest = said[0].partition(":")
+    return (f"{name}, with {label}{colon}{rest}", *said[1:])
 
 
 def _of_one(findings: Findings[Solidification], said: Sequence[str]) -> str:
     """The answer of a study of one run, from what is said of it under names."""
     texts = [text.partition(": ")[2] for text in said]
     return worded("cast_answer.j2", it=AnswerWords(findings.answer), said=texts)
+
+
+def _longer(summary: pd.DataFrame) -> tuple[NextStep, ...]:
+    """More time, where runs ended before the casting was solid and more would let it be."""
+    if DETAIL not in summary:
+        return ()
+    ended = summary[DETAIL].astype(str).str.contains("raise until_s").sum()
+    until_s = Solidification.model_fields["until_s"].default
+    line = f"scenario: {{until_s: {until_s:g}}}"
+    return (step("until", line, runs=int(ended)),) if ended else ()
 
 
 def _steps(

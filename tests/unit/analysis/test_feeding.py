@@ -87,6 +87,14 @@ def test_a_low_niyama_is_told_by_its_place_and_without_risers() -> None:
     assert (1e3 * it.low.low_m[0], 1e3 * it.low.high_m[0]) == pytest.approx((10.0, 14.0))
     assert it.low_fraction == pytest.approx(4 / 22)
     assert (1e3 * it.lowest_m[0], it.least_niyama) == pytest.approx((12.5, 100.0))
+    flowing = FLOWS_S.copy()
+    flowing[X == 5.5] = np.nan
+    early = feeding(fields | {"flows_s": flowing})
+    assert early is not None
+    assert np.isnan(early.cut_off_fraction)
+    in_riser = feeding(fields | {"flows_s": np.where(X > 22, np.nan, FLOWS_S)})
+    assert in_riser is not None
+    assert in_riser.cut_off_fraction == pytest.approx(15 / 22)
     nowhere = feeding(fields | {"niyama_sqrt_ks_m": np.full(len(X), np.nan)})
     assert nowhere.low is None
     assert np.isnan(nowhere.low_fraction)

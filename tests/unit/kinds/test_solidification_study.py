@@ -5,6 +5,7 @@ from __future__ import annotations
 import base64
 import io
 import math
+import re
 from collections.abc import Callable, Mapping
 from pathlib import Path
 from typing import Any
@@ -29,6 +30,7 @@ from sandmould.bad_input import BadInputError
 from sandmould.casting.arpm import computation
 from sandmould.execution.simulate import export_run, measure_run, render_run, simulate
 from sandmould.report.cast_fields import cast_fields, distance_from
+from sandmould.report.kinds.solidification import _longer
 from sandmould.report.page import write_report
 from sandmould.runs import checkpoint_file
 from sandmould.runs.checkpoint_file import CheckpointFile
@@ -213,7 +215,7 @@ def test_a_study_is_computed_collected_and_reported(tmp_path: Path) -> None:
         or "No setting comes within" in page
     )
     assert "All settings against element 5 mm, exchange difference" in page
-    assert "Last: the casting is solid after" in page
+    assert re.search("Last, with element [^:]+: the casting is solid after", page)
     assert "no shape is named as a riser, so nothing feeds that place" in page
     assert "Temperature at the probes of run" in page
     assert "Cooling curves" in page
@@ -268,8 +270,8 @@ def test_a_short_riser_leaves_a_plate_without_feed(tmp_path: Path) -> None:
     )
     first, risers = (np.nanmax(fields["frozen_s"][part]) for part in (own, fields["riser"]))
     assert text.startswith(f"Last: the part is solid after {number(first)} s, last at x = ")
-    ending = f"; the risers are after {number(risers)} s." if risers > first else (
-        "; that is later than the risers.")  # fmt: skip
+    ending = f"; the riser is after {number(risers)} s." if risers > first else (
+        "; that is later than the riser.")  # fmt: skip
     assert text.endswith(ending)
 
 
@@ -289,7 +291,7 @@ def test_both_halves_are_told_and_a_riser_that_is_too_low(tmp_path: Path) -> Non
         steps = " ".join(it.text for it in found.riser)
         assert ("So is 1 place of the same size." in told) == is_low
         assert ("so too the other place of that size" in steps) == is_low
-        above = "Height: the part reaches 12.5 mm higher than its risers, if y points up."
+        above = "Height: the part reaches 12.5 mm higher than its riser, if y points up."
         assert (above in told) == is_low
         assert ("at least 12.5 mm higher, or turn" in steps) == is_low
         heads = [column.title for column in found.tables[1].columns]
@@ -314,8 +316,8 @@ def test_what_a_riser_shares_with_the_part_is_riser(tmp_path: Path) -> None:
         assert part_s < last["solidification_time_s"]
         assert found[-1]["volume_m3"][own].sum() == pytest.approx(600e-6)
         said = cast_fields(folder, read_run(folder / "scenario.yaml").scenario)[2]
-        assert "; the risers are after" in said[0]
-        assert said[1].startswith("Feeding: the risers feed all of the casting")
+        assert "; the riser is after" in said[0]
+        assert said[1].startswith("Feeding: the riser feeds all of the casting")
     for name in found[0].files:
         np.testing.assert_array_equal(found[0][name], found[1][name])
         np.testing.assert_array_equal(found[0][name], found[2][name])
@@ -377,6 +379,9 @@ def test_a_run_that_ends_liquid_says_so(tmp_path: Path) -> None:
     measure_run(folder)
     last = pd.read_csv(folder / "measures.tsv", sep="\t").iloc[-1]
     assert np.isnan(last["solidification_time_s"])
+    (step,) = _longer(pd.DataFrame({"detail": [outcome.detail, float("nan")]}))
+    assert step.line == "scenario: {until_s: 20000}"
+    assert _longer(pd.DataFrame({"detail": [""]})) == ()
 
 
 def test_sizes_that_break_the_rule_are_told_before_anything_starts(tmp_path: Path) -> None:

@@ -64,7 +64,7 @@ def test_studies_of_one_key_stand_over_it(finished: Path, monkeypatch: pytest.Mo
     # what a foundry compares beside the objective
     means = [line for line in lines if line.startswith("Mean ")]
     assert means[0] == "Mean solidified fraction ± 95 %"
-    assert "Mean share of the part that is cut off from the risers ± 95 %" in means
+    assert "Mean share of the part below Niyama's limit ± 95 %" in means
     page = Path("page.html").read_text()
     assert "scenario.exchange" in page
     assert "<h3>Share of the part below Niyama&#39;s limit</h3>" in page

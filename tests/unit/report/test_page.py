@@ -168,7 +168,7 @@ def test_failed_run_is_marked_with_its_sentence(text: str) -> None:
     assert row.startswith('<tr class="marked">')
     assert "Grains left the box or passed through a wall." in row
     assert "3 grains passed through the floor" in row
-    assert "Not counted: 1 did not finish, of 9 runs." in Page(text).text
+    assert "Of 9 runs, 1 did not finish" in Page(text).text
     assert "8 of 9" in Page(text).text
 
 

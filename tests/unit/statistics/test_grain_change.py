@@ -45,6 +45,12 @@ def test_intervals_hold_as_often_as_they_say(order: float) -> None:
     assert held / studies > FORETOLD
 
 
+def test_a_largest_distance_is_not_foretold_below_nothing() -> None:
+    own, coarse = np.array([1.0, 9.0, 2.0]), np.array([8.0, 20.0, 12.0])
+    assert GrainChange({}, "pattern_distance_largest_m", own, coarse).finer[0] == 0.0
+    assert GrainChange({}, "pattern_tip_deflection_m", own, coarse).finer[0] < 0.0
+
+
 def test_settings_are_compared_with_their_own() -> None:
     rows = [
         {"run": f"{part}{hz}{n}", "replicate": n, "part": part, KEY: hz, "outcome": "finished",

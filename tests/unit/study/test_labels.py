@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from sandmould.runs.formatting import setting_text
+from sandmould.runs.formatting import mark, setting_text
 from sandmould.study.plan.expand import expand
 from sandmould.study.plan.load_study import open_study
 from sandmould.study.plan.plan_files import plan_table
@@ -53,6 +53,17 @@ def test_settings_that_differ_read_differently(first: dict, second: dict) -> Non
     assert setting_text(first) == setting_text(dict(first))
 
 
+def test_a_long_list_is_told_by_what_it_holds_and_by_the_mark_of_its_run() -> None:
+    """Plan and report once had two marks of one value, and neither said what was meant."""
+    shapes = [{"vertices_m": corner(0.05), "kind": "polygon"}, {"kind": "sphere", "radius_m": 0.01}]
+    as_read = json.dumps([{"kind": "polygon", "vertices_m": corner(0.05)}, shapes[1]])
+    told = f"shapes polygon + sphere ({mark(shapes)})"
+    assert setting_text({"shapes": shapes}) == setting_text({"shapes": as_read}) == told
+    named = [{"kind": "tube", "name": name, "length_m": 0.0512345} for name in "abcde"]
+    assert setting_text({"obstacles": named}).startswith("obstacles a + b + c + 2 more (")
+    assert setting_text({"title": "[" + 50 * "x"}).startswith("title no. (")
+
+
 def test_a_setting_names_sections_of_keys_that_end_alike() -> None:
     text = setting_text({"casting.density_kg_m3": 7200.0, "mould.density_kg_m3": 1600.0})
     assert text == "casting density 7200 kg/m³, mould density 1600 kg/m³"
@@ -68,5 +79,5 @@ def test_a_list_of_small_sections_is_read_as_it_is_said() -> None:
     assert setting_text({"fill.layers": layers}) == "layers 5 x 10 mm + 20 mm + count 60"
     # as a table holds it
     assert setting_text({"fill.layers": json.dumps(layers[:1])}) == "layers 5 x 10 mm"
-    assert " no. " in setting_text({"fill.layers": 9 * layers})
+    assert " 27 values (" in setting_text({"fill.layers": 9 * layers})
     assert setting_text({"shapes": [{"at_m": [1, 2]}]}) == 'shapes [{"at_m": [1, 2]}]'

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import replace
 from pathlib import Path
 
@@ -184,12 +185,12 @@ def test_a_setting_with_some_runs_that_did_not_finish_is_named() -> None:
     summary = answered.table(answered.HZ, **{answered.POCKET: {30: (0.7, 0.71), 45: (0.96, 0.97)}})
     summary.loc[3, "outcome_code"] = 1
     said = first_sentence(answered.answered(summary, answered.POCKET, [answered.HZ]))
-    assert said.endswith("1 of 4 runs did not finish: 1 of 2 with 45 Hz count.")
+    assert said.endswith("Of 4 runs, 1 did not finish: 1 of 2 with 45 Hz count.")
 
 
 def test_runs_that_did_not_finish_are_told_at_once() -> None:
     answer = replace(QUESTIONS["best_at_an_end"](), left_out={"did not finish": 5}, planned=14)
-    assert "5 of 14 runs did not finish." in first_sentence(answer)
+    assert "Of 14 runs, 5 did not finish." in first_sentence(answer)
     answer = replace(answer, decided=Decided.OPEN)
     first, *others = answer.verdict.settings
     settings = (replace(first, n=1), *others)
@@ -216,3 +217,38 @@ def test_no_answer_hides_behind_not_resolved_and_none_shows_metres(name: str) ->
 )
 def test_no_step_is_refused_or_computed_or_harmful(name: str, word: str) -> None:
     assert not [each for each in steps(QUESTIONS[name]()) if word in each.text + each.line]
+
+
+@pytest.mark.parametrize(
+    ("better", "value", "said"),
+    [
+        ("smaller", 0.01, "is 0 for every frequency that was tried, 5 to 6 Hz, and stays within"),
+        ("larger", 0.5, "is 0 for every frequency that was tried, 5 to 6 Hz, but misses 0.500."),
+    ],
+)
+def test_a_measure_that_is_the_same_everywhere_is_held_against_its_target(
+    better: Better, value: float, said: str
+) -> None:
+    same = dict.fromkeys((5, 6), (0.0, 0.0))
+    heights = {5: (0.1, 0.1), 6: (0.2, 0.1)}
+    summary = answered.table(answered.HZ, solid_fraction=same, bed_height_m=heights)
+    asked = answered.answered(summary, "solid_fraction", [answered.HZ], better).asked
+    answer = decide(replace(asked, goal=Goal("solid_fraction", value)), Evidence(summary))
+    assert answer.decided is Decided.EQUAL
+    assert said.replace("5 to", "5 Hz to") in first_sentence(answer)
+
+
+def test_what_a_run_without_a_value_says_of_itself_is_told() -> None:
+    """A casting that is stopped early has no time; the one that had was called the only one."""
+    times = {30: (math.nan,), 45: (249.0,)}
+    summary = answered.table(answered.HZ, solidification_time_s=times)
+    summary["detail"] = ["still liquid at 300 s: raise until_s", ""]
+    said = first_sentence(
+        answered.answered(summary, "solidification_time_s", [answered.HZ], "smaller")
+    )
+    assert "is 249 s with 45 Hz" in said
+    assert "Of 2 runs, 1 gave no value (still liquid at 300 s: raise until_s): none counts" in said
+    alone = answered.answered(summary[:1], "solidification_time_s", [], "smaller")
+    assert first_sentence(alone).startswith(
+        "The run gives no solidification time: still liquid at 300 s: raise until_s."
+    )
