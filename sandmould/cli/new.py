@@ -71,6 +71,7 @@ def new(
     from sandmould.runs.formatting import runs_text
 
     path = file or Path(f"my_{name}.yaml")
+    path = path if path.suffix else path.with_suffix(".yaml")
     plan = write_new_study(name, path, options)
     typer.echo(
         f"{path}: {runs_text(len(plan.runs))}. Change what is not yours; each line says how."

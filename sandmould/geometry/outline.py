@@ -8,8 +8,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 Array = NDArray[np.float64]
-_CHUNK = 1_000_000
-"""Pairs of point and edge held in memory together."""
 
 
 @dataclass(frozen=True)
@@ -33,11 +31,8 @@ class Outline:
         start_m, end_m = self.vertices_m, np.roll(self.vertices_m, -1, axis=0)
         beyond_m = np.maximum(start_m.min(axis=0) - position_m, position_m - start_m.max(axis=0))
         distance_m = np.linalg.norm(np.maximum(beyond_m, 0.0), axis=1)
-        near = np.flatnonzero(distance_m <= reach_m)
-        for part in np.array_split(near, max(1, -(-len(near) * len(start_m) // _CHUNK))):
-            p = position_m[part]
-            sign = np.where(_is_inside(p, start_m, end_m), -1.0, 1.0)
-            distance_m[part] = sign * _nearest_edge_m(p, start_m, end_m)
+        near = distance_m <= reach_m
+        distance_m[near] = _signed_m(position_m[near], (start_m, end_m), (start_m, end_m))
         return distance_m
 
     def corners(self) -> Array:
@@ -102,25 +97,6 @@ def _cross(a: Array, b: Array) -> Array:
     return np.asarray(a[..., 0] * b[..., 1] - a[..., 1] * b[..., 0])
 
 
-def _is_inside(point_m: Array, start_m: Array, end_m: Array) -> NDArray[np.bool_]:
-    """Whether a ray from each point along the second axis meets an odd number of edges."""
-    u, v = point_m[:, None, 0], point_m[:, None, 1]
-    spans = (start_m[:, 0] > u) != (end_m[:, 0] > u)
-    width_m = np.where(start_m[:, 0] == end_m[:, 0], 1.0, end_m[:, 0] - start_m[:, 0])
-    share = (u - start_m[:, 0]) / width_m
-    above = start_m[:, 1] + share * (end_m[:, 1] - start_m[:, 1]) > v
-    return np.asarray(np.sum(spans & above, axis=1) % 2 == 1)
-
-
-def _nearest_edge_m(point_m: Array, start_m: Array, end_m: Array) -> Array:
-    """Distance of points from the nearest of some edges, (n,) float64, m."""
-    edge_m = end_m - start_m
-    from_start_m = point_m[:, None] - start_m
-    share = np.sum(from_start_m * edge_m, axis=2) / np.sum(edge_m**2, axis=1)
-    away_m = from_start_m - np.clip(share, 0.0, 1.0)[..., None] * edge_m
-    return np.asarray(np.sqrt(np.sum(away_m**2, axis=2).min(axis=1)))
-
-
 def meridian_distance_m(point_m: Array, profile_m: Array) -> Array:
     """Signed distance in the half plane through the axis of a body of revolution.
 
@@ -140,6 +116,15 @@ def meridian_distance_m(point_m: Array, profile_m: Array) -> Array:
     """
     start_m, end_m = profile_m, np.roll(profile_m, -1, axis=0)
     real = (start_m[:, 1] > 0.0) | (end_m[:, 1] > 0.0)
-    distance_m = _nearest_edge_m(point_m, start_m[real], end_m[real])
     # the ray leads away from the axis, so edges on the axis are never met
-    return np.where(_is_inside(point_m, start_m, end_m), -distance_m, distance_m)
+    return _signed_m(point_m, (start_m[real], end_m[real]), (start_m, end_m))
+
+
+def _signed_m(point_m: Array, near: tuple[Array, Array], round_: tuple[Array, Array]) -> Array:
+    """Distance from the nearest of some edges, (n,) float64, m, negative inside others."""
+    # a plan of rectangles compiles nothing
+    from sandmould.geometry.edges import is_inside, nearest_edge_m
+
+    point_m = np.ascontiguousarray(point_m, dtype=np.float64)
+    distance_m = nearest_edge_m(point_m, *near)
+    return np.where(is_inside(point_m, *round_), -distance_m, distance_m)

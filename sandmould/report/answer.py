@@ -19,6 +19,7 @@ from sandmould.runs.formatting import (
     number,
     range_text,
     rounded,
+    unit_of,
     value_text,
     with_margin,
 )
@@ -80,7 +81,7 @@ def optimum_headline(
     places = []
     for key, value in optimum.setting.items():
         low, high = optimum.interval(key) if advised is None else advised.interval_hz or (0, 0)
-        name = "" if len(optimum.keys) == 1 else f"{name_of(key)} "
+        name = "" if len(optimum.keys) == 1 and unit_of(key) else f"{name_of(key)} "
         at = f"{name}{value_text(key, float(f'{value:.3g}'))}"
         interval = f"95 %: {range_text(key, low, float(f'{high:.3g}'))}"
         drive = _as_drive(drive_at(summary, optimum.keys, optimum.setting))
@@ -89,6 +90,7 @@ def optimum_headline(
     said = worded(
         "optimum.j2", it=AnswerWords(answer), places=places, ends=ends, sound=pages.sound,
         share="" if math.isnan(share) else f"{100 * share:.0f} %", is_full=share >= FULL_SHARE,
+        is_vague=optimum.is_vague,
     )  # fmt: skip
     return said, pages.sound
 

@@ -94,7 +94,7 @@ def optimum_pages(
         said.insert(1, mode.beside(optimum.setting[key]))
     if study.refine.rounds:
         said.append(effort_sentence(log, study, summary))
-    sound = not ends and not wide
+    sound = not ends and not wide and not optimum.is_vague
     advised = None
     if robustness is not None:
         opening = robustness_sentences(robustness.assessment)[:1]

@@ -18,6 +18,7 @@ _UNITS = (
     ("_kg_m3", "kg/m³"), ("_n_m3", "N/m³"), ("_m_s2", "m/s²"), ("_m2_s", "m²/s"),
     ("_m2k_w", "m² K/W"), ("_rad_s", "rad/s"), ("_m_s", "m/s"), ("_n_m", "N/m"),
     ("_kg_m", "kg m"), ("_kg_s", "kg/s"),
+    ("_mm", "mm"), ("_um", "µm"), ("_ms", "ms"), ("_kpa", "kPa"), ("_rpm", "rpm"),
     ("_per_s", "1/s"), ("_fraction", ""), ("_bytes", "bytes"), ("_mb", "MB"), ("_deg", "°"),
     ("_hz", "Hz"), ("_pa", "Pa"), ("_kg", "kg"), ("_m3", "m³"), ("_m2", "m²"), ("_g", "g"),
     ("_m", "m"), ("_s", "s"), ("_h", "h"), ("_n", "N"), ("_j", "J"), ("_k", "K"),
@@ -85,6 +86,7 @@ _OF_CAVITY = {
     "_voids": "number of voids in the",
 }
 """Measures of a cavity."""
+_SHOWN = {"m": (1e3, "mm"), "m²": (1e6, "mm²"), "m³": (1e6, "cm³")}
 _PREFIXES = ((1e9, "G"), (1e6, "M"))
 _PREFIXED = ("Pa", "N/m")
 """Units in which moduli and stiffnesses of millions are common."""
@@ -195,23 +197,27 @@ def _as_exact(values: Iterable[float], width: float) -> list[str]:
     return [text.lstrip("-") if not text.strip("-0.") else text.replace("-", "−") for text in shown]
 
 
+def shown_unit(key: str) -> tuple[float, str]:
+    """Factor by which a measure is shown, and the unit then: lengths in mm, areas in mm²."""
+    unit = unit_of(key)
+    return _SHOWN.get(unit, (1.0, unit))
+
+
 def display_scale(key: str) -> tuple[float, str]:
-    """Factor by which a measure is shown, and its name with the unit then: lengths in mm."""
-    if unit_of(key) == "m":
-        return 1e3, f"{name_of(key)}, mm"
-    return 1.0, titled(key)
+    """Factor by which a measure is shown, and its name with the unit then."""
+    factor, unit = shown_unit(key)
+    return factor, f"{name_of(key)}, {unit}" if unit else name_of(key)
 
 
 def display_number(key: str, value: float, digits: int = 3) -> str:
-    """A value of a measure with its unit as it is shown: lengths in mm."""
-    unit = unit_of(key)
-    factor, unit = (1e3, "mm") if unit == "m" else (1.0, unit)
+    """A value of a measure with its unit as it is shown."""
+    factor, unit = shown_unit(key)
     return f"{number(factor * value, digits)} {unit}".rstrip()
 
 
 def display_range(key: str, low: float, high: float) -> str:
     """An interval of a measure with its unit as it is shown, to the second digit of its width."""
-    factor, unit = (1e3, "mm") if unit_of(key) == "m" else (1.0, unit_of(key))
+    factor, unit = shown_unit(key)
     ends = _as_exact((factor * low, factor * high), factor * (high - low))
     return f"{' to '.join(ends)} {unit}".rstrip()
 

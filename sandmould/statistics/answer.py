@@ -98,6 +98,8 @@ class Answer:
     shortest: Setting | None = None
     """That which reaches it first, of those that are shown to if any are, where the runs tell."""
     shortest_s: float = 0.0
+    poured: bool = False
+    """Whether those settings reach it before the box is shaken."""
     ends: tuple[SweepEnd, ...] = ()
     table_ends: tuple[SweepEnd, ...] = ()
     """Ends beyond which the user's table cannot go."""
@@ -231,19 +233,31 @@ class Answer:
         return self.passage.change if self.passage else 0.0
 
     @property
+    def is_rising(self) -> bool:
+        """Whether the best setting was still getting better as its vibration ended."""
+        return self.still_changes * (1.0 if self.asked.better == "larger" else -1.0) > 0.0
+
+    @property
     def longer_helps(self) -> bool:
-        """Whether the best setting was still getting better as its vibration ended.
+        """Whether it was.
 
         Where a target is missed, fast enough to reach it within ``MOST_QUARTERS`` at that pace.
         """
-        sign = 1.0 if self.asked.better == "larger" else -1.0
-        if self.still_changes * sign <= 0.0:
-            return False
+        return self.is_rising and not self._quarters > MOST_QUARTERS
+
+    @property
+    def more_s(self) -> float:
+        """Further vibration that a missed target takes at the pace of the last quarter, or NaN."""
+        return self._quarters * self.passage.lasts_s / 4.0 if self.passage else math.nan
+
+    @property
+    def _quarters(self) -> float:
+        """The same in quarters of the vibration; NaN where no target is missed."""
         share = self.shares.get(self.best.label) if self.best else None
         if self.decided is not Decided.NONE_REACHES or share is None or self.asked.goal is None:
-            return True
+            return math.nan
         gained = share.mean * abs(self.still_changes) / (1.0 + abs(self.still_changes))
-        return abs(self.asked.goal.value - share.mean) <= MOST_QUARTERS * gained
+        return abs(self.asked.goal.value - share.mean) / gained if gained else math.inf
 
     @property
     def nearly_empty(self) -> bool:

@@ -156,6 +156,22 @@ class Spread:
             return difference, None
         return difference, MeanTest(difference, error, df, len(self.values))
 
+    def weigh(self, weights: Array) -> tuple[float, float, float]:
+        """A weighted sum of the means, its standard error and the degrees of freedom of that.
+
+        Where settings scatter unlike each other, by their own spreads (Satterthwaite 1946).
+
+        ``weights``: (settings,) float64, together zero, in the order of ``values``.
+        """
+        total, scale = self.contrasts.weighed(weights)
+        of = [(w**2 * float(v.var()) / len(v), len(v) - 1) for w, v in
+              zip(weights, self.values.values(), strict=True) if w]  # fmt: skip
+        if not self.are_unlike or min(df for _, df in of) < 1:
+            return total, self.contrasts.sd * scale, float(self.contrasts.df)
+        variance = sum(part for part, _ in of)
+        squares = sum(part**2 / df for part, df in of)
+        return total, math.sqrt(variance), variance**2 / squares if squares else math.inf
+
     def _place(self, label: str) -> int:
         return list(self.values).index(label)
 

@@ -196,15 +196,21 @@ def _with_target(answer: Answer, goal: Goal, evidence: Evidence, summary: pd.Dat
         if not answer.asked.by_lot
         or sign * (shares[s.label].mean - goal.value) >= shares[s.label].ci_half_width
     ]  # fmt: skip
-    times_s = {}
-    for setting in (shown or reach) if better == "larger" else ():
-        runs = _runs(summary, answer.asked, setting)
-        times_s[setting.label] = reached_s(evidence.curves, runs, goal.measure, goal.value)
-    told = [s for s in shown or reach if math.isfinite(times_s.get(s.label, math.nan))]
+    sure = (shown or reach) if better == "larger" else []
+    runs = {s.label: _runs(summary, answer.asked, s) for s in sure}
+    curves, at = evidence.curves, (goal.measure, goal.value)
+    times_s = {label: reached_s(curves, own, *at) for label, own in runs.items()}
+    is_poured = bool(sure) and not any(times_s.values())
+    told = [s for s in sure if not is_poured and math.isfinite(times_s[s.label])]
     shortest = min(told, key=lambda s: times_s[s.label], default=None)
+    if shortest is not None and shortest is not sure[0]:
+        # each of its runs before each of the gentlest setting's, or it may be chance
+        slow, fast = ([reached_s(curves, [run], *at) for run in runs[s.label]]
+                      for s in (shortest, sure[0]))  # fmt: skip
+        shortest = shortest if max(slow) < min(fast) else None
     return replace(
         answer, shares=shares, reach=tuple(reach), shown=tuple(shown), shortest=shortest,
-        shortest_s=times_s[shortest.label] if shortest else 0.0,
+        shortest_s=times_s[shortest.label] if shortest else 0.0, poured=is_poured,
         decided=Decided.REACHED if reach else Decided.NONE_REACHES,
     )  # fmt: skip
 

@@ -28,8 +28,8 @@ class MainEffect:
     """Level with the highest mean."""
     low: Any
     apart: Comparison
-    """High minus low, or over it, by the scatter that all settings share; its interval holds for
-    all pairs of the key's levels together."""
+    """High minus low, or over it, by the scatter that all settings share if they do; its interval
+    holds for all pairs of the key's levels together."""
 
 
 def main_effects(verdict: Verdict, keys: Sequence[str]) -> tuple[MainEffect, ...]:
@@ -49,10 +49,9 @@ def main_effects(verdict: Verdict, keys: Sequence[str]) -> tuple[MainEffect, ...
         weights = at / at.sum(axis=1, keepdims=True)
         means = weights @ contrasts.means
         high, low = int(means.argmax()), int(means.argmin())
-        difference, scale = contrasts.weighed(weights[high] - weights[low])
-        error = contrasts.sd * scale
+        difference, error, df = spread.weigh(weights[high] - weights[low])
         if error > _ROUND_OFF * float(np.abs(means).max()):
-            test = MeanTest(difference, error, contrasts.df, len(values))
+            test = MeanTest(difference, error, df, len(values))
             apart = Comparison.of(str(values[low]), difference, test, verdict.by_factor)
             found.append(MainEffect(key, values[high], values[low], apart))
     return tuple(found)
@@ -69,8 +68,7 @@ def has_trend(verdict: Verdict, key: str) -> bool:
         return True
     levels = sorted({s.values[key] for s in used})
     rank = np.array([levels.index(s.values[key]) for s in used], dtype=np.float64)
-    difference, scale = spread.contrasts.weighed(rank - rank.mean())
-    error = spread.contrasts.sd * scale
+    difference, error, df = spread.weigh(rank - rank.mean())
     if not error > _ROUND_OFF * float(np.abs(spread.contrasts.means).max()):
         return True
-    return MeanTest(difference, error, spread.contrasts.df).pvalue < TREND
+    return MeanTest(difference, error, df).pvalue < TREND

@@ -18,6 +18,8 @@ from sandmould.statistics.evidence import usable_values
 from sandmould.statistics.mean_tests import CONFIDENCE
 
 DRAWS = 2000
+VAGUE = 0.5
+"""Share of the sweep beyond which an interval names no best value (argued)."""
 LOG_RATIO = 4.0
 """A key whose values span more than this ratio is looked at by its logarithm."""
 _ACROSS = {1: 241, 2: 41}
@@ -79,6 +81,14 @@ class Optimum:
         low, high = self.interval(key)
         lowest = [SweepEnd(key, low, False)] if low == values.min() else []
         return lowest + ([SweepEnd(key, high, True)] if high == values.max() else [])
+
+    @property
+    def is_vague(self) -> bool:
+        """Whether the interval of a key is wider than ``VAGUE`` of what was swept."""
+        points = _scaled(self.points, self.logs)
+        ends = np.array([self.interval(key) for key in self.keys]).T
+        width = np.ptp(_scaled(ends, self.logs), axis=0)
+        return bool((width > VAGUE * np.ptp(points, axis=0)).any())
 
     def at_end(self, key: str) -> str:
         """Those ends by name: lowest, highest, both or none."""

@@ -80,7 +80,10 @@ def _swing(course: NDArray[np.float64]) -> float:
 
 
 def reached_s(curves: pd.DataFrame, runs: Iterable[str], measure: str, level: float) -> float:
-    """Time of vibration from which the mean of runs stays at a level or above; NaN where not."""
+    """Time of vibration from which the mean of runs stays at a level or above; NaN where not.
+
+    0 where it is there from the beginning and at the end: dips between are not counted.
+    """
     shaken = _shaken(curves, runs, measure)
     of_runs = [(run[VIBRATION_TIME_S], run[measure]) for _, run in shaken.groupby(RUN)]
     if not of_runs:
@@ -88,8 +91,8 @@ def reached_s(curves: pd.DataFrame, runs: Iterable[str], measure: str, level: fl
     time_s = np.unique(np.concatenate([times for times, _ in of_runs]))
     mean = np.mean([np.interp(time_s, *curve) for curve in of_runs], axis=0)
     below = np.flatnonzero(mean < level)
-    if not len(below):
-        return float(time_s[0])
+    if mean[0] >= level <= mean[-1]:
+        return 0.0
     return first_reach_s(time_s[below[-1] :], mean[below[-1] :], level)
 
 

@@ -11,7 +11,6 @@ from typing import Any
 
 from sandmould.runs.formatting import (
     OF_BED,
-    display_scale,
     distinct_names,
     factor_text,
     filled_space,
@@ -21,7 +20,7 @@ from sandmould.runs.formatting import (
     number,
     runs_text,
     seconds,
-    unit_of,
+    shown_unit,
     value_text,
     with_article,
     with_margin,
@@ -223,8 +222,7 @@ class AnswerWords:
     def value(self, mean: float, half_width: float = math.nan, digits: int = 0) -> str:
         """A value of the measure with its unit."""
         measure = self.answer.asked.measure
-        factor = display_scale(measure)[0]
-        unit = "mm" if factor != 1.0 else unit_of(measure)
+        factor, unit = shown_unit(measure)
         digits = digits or (2 if self.answer.stand_ins else 3)
         scale = 1.0 if measure.endswith("_fraction") else math.inf
         text = _shown(factor * mean, factor * half_width, digits, scale)
@@ -249,6 +247,34 @@ class AnswerWords:
         """The value that is good enough."""
         goal = self.answer.asked.goal
         return "" if goal is None else self.value(goal.value)
+
+    @property
+    def within(self) -> str:
+        """How a value that should be small is said to reach its target."""
+        goal = self.answer.asked.goal
+        return "within" if goal is None or goal.value > 0.0 else "at or below"
+
+    @property
+    def more(self) -> str:
+        """Further vibration that the target takes at the pace of the last quarter."""
+        return self.seconds(self.answer.more_s)
+
+    @property
+    def ends_told(self) -> bool:
+        """Of a value over a sweep: whether its highest is told from its lowest."""
+        against = self.answer.verdict.against(max(self.answer.used, key=lambda s: s.mean))
+        return against is not None and against.separated
+
+    @property
+    def told_pair(self) -> tuple[str, str] | None:
+        """Of a value over a sweep whose ends are not told apart: two settings that are."""
+        spread, used = self.answer.verdict.spread, self.answer.used
+        low, high = (f(used, key=lambda s: s.mean) for f in (min, max))
+        for end, other in ((e, s) for e in (high, low) for s in used if s is not e):
+            test = spread.compare(end.label, other.label)[1] if spread else None
+            if test is not None and Comparison("", 0.0, test, is_factor=False).separated:
+                return end.label, other.label
+        return None
 
     @property
     def to_target(self) -> str:
@@ -339,6 +365,12 @@ class AnswerWords:
         (one,), goal = self.answer.reach, self.answer.asked.goal
         others = [s for label, s in self.answer.shares.items() if label != one.label]
         return goal is not None and all(abs(s.mean - goal.value) > s.ci_half_width for s in others)
+
+    @property
+    def all_same(self) -> bool:
+        """Whether all settings that are not told from the best have its very values."""
+        of = {(s.n, s.mean, s.sd) for s in self.answer.alike}
+        return len(of) == 1 < len(self.answer.alike)
 
     @property
     def effects(self) -> list[str]:

@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 
 from sandmould.definition.certificate import frequency_key
 from sandmould.definition.study import Study
+from sandmould.kinds.sand.kind import SandStudy
 from sandmould.kinds.sand.narrow import Narrow
 from sandmould.runs.formatting import (
     filled_space,
@@ -21,6 +23,7 @@ from sandmould.statistics.config import fewest_points
 from sandmould.statistics.optimum import Optimum
 from sandmould.statistics.robustness import Robustness
 from sandmould.statistics.verdict import FEW
+from sandmould.wording.answer import AnswerWords
 
 WORTH = 30
 """More replicates than that of each setting are not worth the difference that they would show."""
@@ -109,10 +112,20 @@ def answer_steps(study: Study, answer: Answer) -> list[NextStep]:
 def _onwards(answer: Answer) -> Iterable[NextStep]:
     """Longer shaking, or values beyond the ends of the sweep, where these may do better."""
     decided = answer.decided
-    if answer.asked.better == "neither" or decided in (Decided.REACHED, Decided.EQUAL):
+    if answer.asked.better == "neither":
         return
-    if answer.longer_helps:
-        yield step("longer", measure=name_of(answer.asked.measure))
+    is_done = {Decided.REACHED, Decided.EQUAL}
+    open_ = [a for a in (answer, *answer.beside) if a.decided not in is_done]
+    late = next((a for a in open_ if a.longer_helps), None)
+    if late is not None:
+        more = AnswerWords(late).more if math.isfinite(late.more_s) else ""
+        yield step("longer", measure=name_of(late.asked.measure), more=more)
+    elif answer.is_rising and decided is Decided.NONE_REACHES:
+        words = AnswerWords(answer)
+        yield step("slow", more=words.more, space=words.space)
+    is_unsure = not answer.shown and min((s.n for s in answer.used), default=0) > 1
+    if decided is Decided.EQUAL or (decided is Decided.REACHED and not is_unsure):
+        return
     if decided is Decided.OPEN and answer.asked.by_lot and not _is_worth(answer.further_runs):
         return
     for end in answer.ends:
@@ -192,7 +205,8 @@ def optimum_steps(
             side = one if len(untried) == 1 else "on both sides of"
             steps.append(step("outside", a_key=with_article(name_of(key)), side=side))
     low_high = {key: optimum.interval(key) for key in study.refine.interval}
-    if any(high - low > study.refine.interval[k] for k, (low, high) in low_high.items()):
+    wide = [high - low > study.refine.interval[k] for k, (low, high) in low_high.items()]
+    if any(wide) or (optimum.is_vague and not steps):
         steps.append(step("rounds", f"refine: {{rounds: {study.refine.rounds + 2}}}"))
     if robustness is None:
         return steps
@@ -215,7 +229,12 @@ def certificate_steps(study: Study, answer: Answer) -> list[NextStep]:
     """The controls of a best frequency, where none were asked for."""
     is_best = answer.best is not None and study.seeks_best
     is_swept = study.sweep.number_of_points > 1 and frequency_key(study.sweep)
-    if not is_best or not is_swept or study.certificate.controls:
+    if (
+        not isinstance(study, SandStudy)
+        or not is_best
+        or not is_swept
+        or study.certificate.controls
+    ):
         return []
     fewest = fewest_points(1)
     if study.sweep.number_of_points < fewest:

@@ -220,7 +220,7 @@ def _failure(scenario: OwnDeck, folder: Path, status: int, results: Path) -> Pro
     shutil.copy(logs[0], kept)
     return Problem(
         "scenario.template", scenario.template, "a deck that runs",
-        sentence=f"{_of_values(scenario)} stopped in a pilot run, so none was begun. {said}. Its "
+        sentence=f"{_of_values(scenario)} stopped in a pilot run. {said}. Its "
         f"log: {display_path(kept)}",
     )  # fmt: skip
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import replace
 from itertools import chain
 from pathlib import Path
 from typing import Literal
@@ -161,9 +162,10 @@ def measure_speeds(plan: Plan, results: Path) -> None:
         except BadInputError as error:
             failures |= {str(problem): problem for problem in error.problems}
     if failures and not runs_somewhere:
-        raise BadInputError(list(failures.values())[:1])
+        first = next(iter(failures.values()))
+        raise BadInputError([replace(first, sentence=f"{first.sentence}. No run was begun")])
     for said in failures:
-        say(said)
+        say(f"{said} The other points are computed.")
 
 
 def _to_measure(plan: Plan, speed: StoredSpeed[AnyScenario]) -> str:

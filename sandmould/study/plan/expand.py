@@ -206,9 +206,12 @@ class _AtPoint:
     def table_problem(self) -> Problem:
         """Why the table cannot do the point."""
         key = f"table.{self.table_limit}"
-        valid = f"a limit that allows {setting_text(self.point) or 'the motion of the scenario'}"
+        at = setting_text(self.point) if self.point else "the motion of the scenario"
         value = value_at(self.study.study.model_dump(mode="json"), key)
-        return Problem(key, value, valid, self.study.origin.file_of(key))
+        said = f"{key} = {value} does not allow {at}: shake it less, or at another frequency"
+        return Problem(
+            key, value, f"a limit that allows {at}", self.study.origin.file_of(key), said
+        )
 
     def _scenario(self, point: Point, origin: Origin) -> Any:
         tree = self.base

@@ -127,7 +127,7 @@ def test_a_deck_that_fails_is_told_with_the_engines_own_line(tmp_path: Path) -> 
         measure_speeds(failing(tmp_path, "[24, 32]"), results)
     (said,) = str(told.value).splitlines()
     assert "Unknown command: nonsense here" in said
-    assert said.endswith(f" Its log: {results / speed.FAILED_LOG}.")
+    assert said.endswith(f" Its log: {results / speed.FAILED_LOG}. No run was begun.")
     assert "nonsense here" in (results / speed.FAILED_LOG).read_text()
     assert not (user_cache() / "speeds").exists()
 
@@ -138,6 +138,7 @@ def test_a_point_that_fails_alone_is_told_and_keeps_nothing_from_running(
     measure_speeds(failing(tmp_path, "[8, 32]"), tmp_path / "results")
     said = capsys.readouterr().err
     assert said.startswith("Trying own.in.j2 at 2 points, each for some seconds.\n")
+    assert said.rstrip().endswith("The other points are computed.")
     assert "Unknown command: nonsense here" in said
 
 

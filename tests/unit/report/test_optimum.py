@@ -105,6 +105,16 @@ def test_an_interval_at_the_end_of_the_sweep_is_not_resolved(tmp_path: Path) -> 
     assert "a frequency above" in optimum_steps(study, pages.optimum, None)[0].text
 
 
+def test_an_interval_over_most_of_the_sweep_names_no_best(tmp_path: Path) -> None:
+    folder = write_refined(tmp_path / "vague")
+    optimum = optimum_pages(folder, read_study(folder), gather(folder).summary)
+    assert optimum is not None
+    assert optimum.optimum is not None
+    assert not optimum.optimum.is_vague
+    everywhere = np.linspace(2, len(optimum.optimum.points) - 3, 2000).astype(int)
+    assert replace(optimum.optimum, picks=everywhere).is_vague
+
+
 def test_the_drive_at_the_optimum_is_told_in_mm_and_g(tmp_path: Path) -> None:
     folder = write_refined(tmp_path / "driven")
     summary = gather(folder).summary

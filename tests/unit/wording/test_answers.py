@@ -9,13 +9,24 @@ from pathlib import Path
 import pandas as pd
 import pytest
 
+from sandmould.kinds.deck.kind import DeckStudy
 from sandmould.kinds.sand.kind import SandStudy
 from sandmould.scenario.drive import BoxDrive
 from sandmould.statistics.answer import Answer, Asked, Decided
 from sandmould.statistics.config import Better, Goal
 from sandmould.statistics.decision import Evidence, decide
-from sandmould.wording.answer import detail_sentences, first_sentence, limit_sentences
-from sandmould.wording.next_steps import NextStep, answer_steps, coarse_step
+from sandmould.wording.answer import (
+    AnswerWords,
+    detail_sentences,
+    first_sentence,
+    limit_sentences,
+)
+from sandmould.wording.next_steps import (
+    NextStep,
+    answer_steps,
+    certificate_steps,
+    coarse_step,
+)
 from tests import answered
 from tests.answered import QUESTIONS
 
@@ -252,3 +263,73 @@ def test_what_a_run_without_a_value_says_of_itself_is_told() -> None:
     assert first_sentence(alone).startswith(
         "The run gives no solidification time: still liquid at 300 s: raise until_s."
     )
+
+
+def test_what_pouring_fills_is_not_told_as_filled_by_shaking() -> None:
+    """A mean that dips below the target while it is shaken was "full after 1.9 s"."""
+    times_s = [0.0, 0.5, 1.0]
+    courses = {"r0_0": (1.0, 0.94, 0.97), "r0_1": (0.99, 0.95, 0.98), "r0_2": (1.0, 0.93, 0.96)}
+    rows = [
+        {"run": run, "time_s": t, "vibration_time_s": t, "stage": "vibrate_1", answered.POCKET: v}
+        for run, values in courses.items()
+        for t, v in zip(times_s, values, strict=True)
+    ]
+    summary = answered.table(answered.HZ, **{answered.POCKET: {30: (0.97, 0.98, 0.96)}})
+    answer = answered.answered(summary, answered.POCKET, [], curves=pd.DataFrame(rows))
+    assert answer.poured
+    assert first_sentence(answer).strip().endswith("% of what fits (3 runs), by pouring alone.")
+
+
+def test_the_shortest_is_told_only_where_no_run_contradicts_it() -> None:
+    summary = answered.table(answered.HZ, **{answered.POCKET: answered.FULL})
+    curves = answered.over_a_second(summary, 0.0, answered.POCKET)
+    for late_s, told in ((0.0, True), (0.1, False)):
+        late = curves["run"] == "r2_1"
+        curves.loc[late, "vibration_time_s"] = curves.loc[late, "time_s"] + late_s
+        answer = answered.answered(summary, answered.POCKET, [answered.HZ], curves=curves,
+                                   drives=answered.AT_04_MM)  # fmt: skip
+        assert (answer.shortest is not None and answer.shortest.label == "60 Hz") == told
+
+
+def test_a_slow_rise_is_told_with_the_time_that_it_would_take() -> None:
+    answer = QUESTIONS["none_reaches"]()
+    assert answer.is_rising
+    assert not answer.longer_helps
+    # 0.0595 of what fits, of which the last quarter brought 0.14/1.14, and 0.95 is asked
+    assert answer.more_s == pytest.approx(0.25 * (0.95 - 0.0595) / (0.0595 * 0.14 / 1.14), rel=0.01)
+    (step,) = [it for it in answer_steps(SandStudy(), answer) if "at the pace" in it.text]
+    assert step.text.startswith("Shake harder, or turn, widen or vent the pocket: ")
+
+
+def test_a_frequency_of_an_own_deck_has_no_certificate() -> None:
+    """The step was refused by the next plan: only studies of sand have that section."""
+    summary = answered.table("frequency_hz", height_m={8: (0.1, 0.11), 50: (0.3, 0.31)})
+    answer = answered.answered(summary, "height_m", ["frequency_hz"])
+    assert certificate_steps(DeckStudy.model_construct(), answer) == []
+
+
+def test_a_target_below_nothing_is_not_kept_within() -> None:
+    summary = answered.table(answered.HZ, flow_per_s={30: (-575.0, -576.0), 45: (-400.0, -401.0)})
+    asked = answered.answered(summary, "flow_per_s", [answered.HZ], "smaller").asked
+    answer = decide(replace(asked, goal=Goal("flow_per_s", -500.0)), Evidence(summary))
+    assert "keeps the flow at or below −500 1/s" in first_sentence(answer)
+
+
+def test_settings_with_the_very_same_runs_are_told_as_the_same() -> None:
+    misses = {12: (9.0, 9.6), 16: (2.0, 2.4), 20: (2.0, 2.4)}
+    summary = answered.table(answered.HZ, miss=misses)
+    answer = answered.answered(summary, "miss", [answered.HZ], "smaller")
+    said = first_sentence(answer)
+    assert said.startswith("16 Hz and 20 Hz give the same lowest miss, 2.2")
+    assert "12 Hz is worse" in said
+
+
+def test_a_value_over_a_sweep_names_settings_that_are_told_apart() -> None:
+    """The highest one scatters so much that the lowest is not told from it; another one is."""
+    tops = {0.5: (38.5, 39.9, 37.3), 1: (38.0, 38.3, 38.6), 2: (50.0, 50.2, 50.1),
+            4: (60.0, 38.0, 95.0)}  # fmt: skip
+    summary = answered.table(answered.HZ, top_mm=tops)
+    words = AnswerWords(answered.answered(summary, "top_mm", [answered.HZ], "neither"))
+    assert words.told_pair == ("1 Hz", "2 Hz")
+    said = first_sentence(words.answer)
+    assert "3 runs each do not tell these two apart, but 1 Hz from 2 Hz" in said

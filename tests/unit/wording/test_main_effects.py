@@ -33,6 +33,22 @@ def grid(replicates: int = 3, factor: float = 0.0) -> pd.DataFrame:
     return pd.DataFrame(rows)
 
 
+def test_unlike_scatters_count_each_by_itself() -> None:
+    """One wild setting is pooled with none: the friction acts where it is wild, or nowhere."""
+    wild = grid()
+    at = (wild[ANGLE] == 4) & (wild[FRICTION] == 0.5)
+    wild.loc[at, "speed_m_s"] = [0.2, 0.5, 0.9]
+    answer = answered(wild, "speed_m_s", [ANGLE, FRICTION], "neither")
+    assert answer.verdict.spread is not None
+    assert answer.verdict.spread.are_unlike
+    _, friction = main_effects(answer.verdict, answer.asked.keys)
+    of = wild.groupby([ANGLE, FRICTION])["speed_m_s"].var()
+    assert friction.apart.test is not None
+    # means of three settings of three runs each, on either side
+    assert friction.apart.test.error == pytest.approx(np.sqrt(of.sum() / 3 / 9))
+    assert friction.apart.test.df == pytest.approx(2.0, abs=0.1)
+
+
 def test_each_key_is_told_with_its_interval() -> None:
     answer = answered(grid(), "speed_m_s", [ANGLE, FRICTION], "neither")
     angle, friction = main_effects(answer.verdict, answer.asked.keys)
