@@ -16,6 +16,7 @@ from jinja2 import Environment
 from sandmould.bad_input import BadInputError
 from sandmould.definition.certificate import frequency_among
 from sandmould.definition.study import Study
+from sandmould.definition.sweep import points
 from sandmould.drawing.animation import BUDGET_BYTES
 from sandmould.drawing.chart import NARROW, SMALL, WIDE, Chart, lay_out
 from sandmould.drawing.figure_files import numbered, write_figures
@@ -53,7 +54,14 @@ from sandmould.statistics.settings import setting_rows
 from sandmould.statistics.verdict import compare_settings
 from sandmould.study.collect import Collected, read_collected, read_provenance, read_study
 from sandmould.study.plan.ownership import owner_of, shipped_name
-from sandmould.study.plan.plan_files import FIGURES, SPHERES, STUDY_FILE, VERDICT_FILE, read_run
+from sandmould.study.plan.plan_files import (
+    FIGURES,
+    SPHERES,
+    STUDY_FILE,
+    VERDICT_FILE,
+    beyond_line,
+    read_run,
+)
 from sandmould.study.plan.stand_ins import stand_ins
 from sandmould.study.rounds.round_log import read_rounds
 from sandmould.wording.answer import (
@@ -253,6 +261,17 @@ def _render(
     return text, figures, of_kind.beside, first.headline
 
 
+def _beyond_table(study: Study, scenario: Any, collected: Collected) -> tuple[Note, ...]:
+    """Points of the sweep that the user's table cannot do: no run was planned of them."""
+    if not study.table_limits or not collected.keys:
+        return ()
+    there = {setting_text(at) for at, _ in setting_rows(collected.summary, collected.keys)}
+    every = ({key: point[key] for key in collected.keys} for point in points(study.sweep, scenario))
+    left_out = [point for point in every if setting_text(point) not in there]
+    line = beyond_line(left_out, study.table_limits).strip()
+    return (Note("Table", line),) if line else ()
+
+
 def _first_screen(
     page: Findings[Any],
     optimum: OptimumPages | None,
@@ -287,6 +306,7 @@ def _first_screen(
         figures, table = figures_of(answer, summary), table_of(answer)
     grounds = (
         *notes("unused.j2", reasons=reasons_text(answer.left_out), planned=answer.planned),
+        *_beyond_table(study, page.scenario, collected),
         *of_kind.grounds,
         *([Note("Tests", robustness.sentences[0])] if robustness else []),
     )

@@ -6,15 +6,18 @@ import math
 from pathlib import Path
 from typing import Any
 
+import pandas as pd
 import pytest
 import yaml
 
 from sandmould.bad_input import BadInputError
 from sandmould.definition.table import VibratingTable
+from sandmould.report.page import _beyond_table
 from sandmould.scenario.drive import BoxDrive
 from sandmould.scenario.vibration import STANDARD_GRAVITY_M_S2
 from sandmould.statistics.answer import Asked, Decided
 from sandmould.statistics.decision import Evidence, decide
+from sandmould.study.collect import Collected
 from sandmould.study.plan.announcement import price
 from sandmould.study.plan.build_plan import Plan, open_plan
 from sandmould.wording.answer import limit_sentences
@@ -56,6 +59,15 @@ def test_settings_beyond_the_table_are_left_out(
     assert ("Left out" in said) == bool(beyond)
     if "largest_displacement_m" in limits:
         assert "since your table cannot do it (largest displacement 0.6 mm): 10 Hz." in said
+
+
+def test_the_report_names_what_the_table_cannot_do(tmp_path: Path) -> None:
+    study = planned(tmp_path, table={"largest_displacement_m": 0.0006}).study.study
+    collected = Collected(pd.DataFrame({HZ: [25, 50, 90]}), pd.DataFrame(), (HZ,))
+    (note,) = _beyond_table(study, study.scenario, collected)
+    assert note.text.endswith("(largest displacement 0.6 mm): 10 Hz.")
+    whole = Collected(pd.DataFrame({HZ: [10, 25, 50, 90]}), pd.DataFrame(), (HZ,))
+    assert _beyond_table(study, study.scenario, whole) == ()
 
 
 def test_a_vibration_during_the_fill_counts(tmp_path: Path) -> None:
