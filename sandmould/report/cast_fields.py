@@ -129,12 +129,11 @@ def _of_part(fields: Mapping[str, Any], scenario: Solidification) -> Freezing | 
 
 
 def _is_all(region: Region, fields: Mapping[str, Any]) -> bool:
-    """Whether a region reaches as far as the part does, but for an element."""
+    """Whether a region reaches nearly as far as the part does."""
     own = fields["melts"] & ~fields["riser"]
-    place_m, size_m = fields["position_m"][own], fields["size_m"][own]
-    whole = region_of(place_m, size_m, fields["volume_m3"][own])
-    off_m = np.abs([region.low_m - whole.low_m, region.high_m - whole.high_m]).max()
-    return bool(off_m <= 1.01 * size_m.max())
+    whole = region_of(*(fields[name][own] for name in ("position_m", "size_m", "volume_m3")))
+    reach, of = region.high_m - region.low_m, whole.high_m - whole.low_m
+    return bool((reach >= 0.9 * of).all())
 
 
 def _above_risers_m(fields: Mapping[str, Any]) -> float:

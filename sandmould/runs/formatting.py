@@ -5,7 +5,7 @@ from __future__ import annotations
 import json
 import math
 import re
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from contextlib import suppress
 from numbers import Real
 from typing import Any, TypeGuard
@@ -185,13 +185,15 @@ def rounded(value: float) -> float:
 
 def with_margin(mean: float, half_width: float) -> str:
     """A mean with its half width, both to the second digit of the half width."""
-    if not math.isfinite(half_width) or half_width <= 0:
+    if not math.isfinite(half_width) or half_width <= _ONE_NUMBER * abs(mean):
         return number(mean)
     return " ± ".join(_as_exact((mean, half_width), half_width))
 
 
-def _as_exact(values: Iterable[float], width: float) -> list[str]:
+def _as_exact(values: Sequence[float], width: float) -> list[str]:
     """Numbers to the second digit of a width, with an exponent where that is very small."""
+    if width <= _ONE_NUMBER * max(map(abs, values)):
+        return [number(x) for x in values]
     places = max(0, 1 - math.floor(math.log10(width))) if width > 0.0 else 3
     shown = (number(x, 2) if places > _MOST_PLACES else f"{x:.{places}f}" for x in values)
     return [text.lstrip("-") if not text.strip("-0.") else text.replace("-", "−") for text in shown]

@@ -153,7 +153,11 @@ class Spread:
             error, df = own if self.are_unlike else (max(error, own[0]), df)
         largest = max(float(self.values[label].abs().max()) for label in (first, second))
         if not error > 1e-12 * largest:
-            return difference, None
+            # all replicates differ by the same: told, unless none of them differs from another
+            scatters = self.in_blocks and all(np.ptp(self.values[x]) > 0 for x in (first, second))
+            if not (scatters and abs(difference) > _ROUND_OFF * largest):
+                return difference, None
+            error = 1e-12 * largest
         return difference, MeanTest(difference, error, df, len(self.values))
 
     def weigh(self, weights: Array) -> tuple[float, float, float]:

@@ -98,11 +98,10 @@ def _decide_one(asked: Asked, evidence: Evidence) -> Answer:
     if refining is not None:
         return replace(answer, decided=Decided.FINEST, refining=refining)
     if len(answer.used) > 1 and _is_same(summary, asked, answer.used):
-        if _are_same_runs(summary, asked):
-            return replace(answer, decided=Decided.NO_EFFECT)
+        is_run = _are_same_runs(summary, asked)
         if asked.better != "neither" and asked.goal and asked.goal.measure in summary:
             answer = _with_target(answer, asked.goal, evidence, summary)
-        return replace(answer, decided=Decided.EQUAL)
+        return replace(answer, decided=Decided.NO_EFFECT if is_run else Decided.EQUAL)
     if asked.better == "neither":
         if len(answer.used) > 1:
             return replace(answer, decided=Decided.RANGE)

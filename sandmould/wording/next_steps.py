@@ -101,7 +101,7 @@ def answer_steps(study: Study, answer: Answer) -> list[NextStep]:
     reaches = decided is not Decided.NONE_REACHES or steps
     unclear = answer.passage and answer.passage.is_unclear
     spaces = [each for each in (answer, *answer.beside) if each.nearly_empty]
-    if study.objective.is_fill and not (spaces or reaches or unclear):
+    if AnswerWords(answer).space and not (spaces or reaches or unclear):
         spaces = [answer]
     for each in spaces:
         space = filled_space(each.asked.measure).replace("_", " ")
@@ -120,7 +120,7 @@ def _onwards(answer: Answer) -> Iterable[NextStep]:
     if late is not None:
         more = AnswerWords(late).more if math.isfinite(late.more_s) else ""
         yield step("longer", measure=name_of(late.asked.measure), more=more)
-    elif answer.is_rising and decided is Decided.NONE_REACHES:
+    elif answer.is_rising and decided is Decided.NONE_REACHES and not answer.nearly_empty:
         words = AnswerWords(answer)
         yield step("slow", more=words.more, space=words.space)
     is_unsure = not answer.shown and min((s.n for s in answer.used), default=0) > 1

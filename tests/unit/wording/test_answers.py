@@ -80,7 +80,7 @@ def test_full_is_said_where_it_was_asked_alone(name: str) -> None:
         ({30: (0.7,), 45: (0.96,)}, "By one run each 45 Hz fills the pocket, with 96 % of what "
          "fits: how much of that is chance is unknown."),
         ({30: (0.7,), 45: (0.6,), 60: (0.5,)}, "By one run each no frequency from 30 Hz to 60 Hz "
-         "fills the pocket: the best mean, 70 % of what fits, is at 30 Hz. A lower frequency may "
+         "fills the pocket: the best, 70 % of what fits, is at 30 Hz. A lower frequency may "
          "change that."),
         ({30: (0.97, 0.98, 0.99), 45: (0.96, 0.97, 0.98)}, "30 Hz fills the pocket, with 98.0 ± "
          "2.5 % of what fits; 45 Hz does on average, which 3 runs each do not show."),
@@ -333,3 +333,36 @@ def test_a_value_over_a_sweep_names_settings_that_are_told_apart() -> None:
     assert words.told_pair == ("1 Hz", "2 Hz")
     said = first_sentence(words.answer)
     assert "3 runs each do not tell these two apart, but 1 Hz from 2 Hz" in said
+
+
+def test_what_differs_by_the_same_in_every_filling_is_told() -> None:
+    """No spread is left between pairs, so the two were "not told apart"."""
+    summary = answered.table(answered.HZ, height_m={20: (0.1, 0.11, 0.09), 30: (0.2, 0.21, 0.19)})
+    answer = answered.answered(summary, "height_m", [answered.HZ])
+    assert answer.decided is Decided.BEST_AT_END
+    told = answered.answered(summary, "height_m", [answered.HZ], "neither")
+    assert first_sentence(told).strip().endswith("(30 Hz): 100 mm more.")
+    # without chance in either the seed may not reach the sand
+    still = answered.table(answered.HZ, height_m={20: (0.1, 0.1), 30: (0.2, 0.2)})
+    assert answered.answered(still, "height_m", [answered.HZ]).decided is Decided.OPEN
+
+
+def test_a_key_without_effect_is_held_against_the_target() -> None:
+    summary = answered.table("material", solid_fraction={"a": (0.6,), "b": (0.6,)})
+    asked = answered.answered(summary, "solid_fraction", ["material"], by_lot=False).asked
+    answer = decide(replace(asked, goal=Goal("solid_fraction", 0.7)), Evidence(summary))
+    said = "are the same; the solid fraction is 0.600, but misses 0.700."
+    assert first_sentence(answer).strip().endswith(said)
+
+
+def test_worse_settings_of_several_keys_stand_in_a_sentence_of_their_own() -> None:
+    keys = [answered.HZ, "friction"]
+    rows = {(20, 0.2): 1.0, (20, 0.4): 1.1, (30, 0.2): 3.0, (30, 0.4): 3.05}
+    summary = pd.DataFrame(
+        {"run": f"{hz}{mu}{r}", answered.HZ: hz, "friction": mu, "replicate": r, "seed": r,
+         "outcome_code": 0, "height_m": mean + d}
+        for (hz, mu), mean in rows.items()
+        for r, d in enumerate((0.0, 0.1 * mu, -0.01 * hz * mu))
+    )  # fmt: skip
+    said = first_sentence(answered.answered(summary, "height_m", keys))
+    assert ". Worse: frequency 20 Hz, friction 0." in said
