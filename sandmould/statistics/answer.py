@@ -205,7 +205,13 @@ class Answer:
     @property
     def suits(self) -> bool:
         """Whether what suits all suits it: where one does not reach its target, nothing does."""
-        return all(a.decided is not Decided.NONE_REACHES for a in (self, *self.beside))
+        return all(a.reach or not a.shares for a in (self, *self.beside))
+
+    @property
+    def is_common_shown(self) -> bool:
+        """Whether what suits all is shown to reach every target, not on average alone."""
+        judged = [a for a in (self, *self.beside) if a.shares]
+        return all({*self.common} <= {s.label for s in a.shown} for a in judged)
 
     @property
     def trades(self) -> bool:
@@ -266,6 +272,6 @@ class Answer:
         is_fill = self.asked.measure.endswith((FILL, OF_BED)) and self.asked.better == "larger"
         if goal is None or best is None or not is_fill:
             return False
-        misses = self.decided in (Decided.NONE_REACHES, Decided.EQUAL)
+        misses = self.decided in (Decided.NONE_REACHES, Decided.EQUAL, Decided.NO_EFFECT)
         share = self.shares.get(best.label, best).mean
         return misses and share < min(NEARLY_EMPTY, goal.value)

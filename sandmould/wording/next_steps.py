@@ -93,11 +93,10 @@ def answer_steps(study: Study, answer: Answer) -> list[NextStep]:
     decided, key = answer.decided, name_of(answer.asked.keys[0]) if answer.asked.keys else ""
     if decided is Decided.NO_RESULT:
         return []
-    if decided is Decided.NO_EFFECT:
-        return [step("cheapest", key=key)]
     if decided is Decided.FINEST:
         return _finer(answer)
-    steps = [*_chance(study, answer), *_onwards(answer)]
+    steps = [step("cheapest", key=key)] if decided is Decided.NO_EFFECT else []
+    steps += [*_chance(study, answer), *_onwards(answer)]
     reaches = decided is not Decided.NONE_REACHES or steps
     unclear = answer.passage and answer.passage.is_unclear
     spaces = [each for each in (answer, *answer.beside) if each.nearly_empty]
@@ -114,7 +113,7 @@ def _onwards(answer: Answer) -> Iterable[NextStep]:
     decided = answer.decided
     if answer.asked.better == "neither":
         return
-    is_done = {Decided.REACHED, Decided.EQUAL}
+    is_done = {Decided.REACHED, Decided.EQUAL, Decided.NO_EFFECT}
     open_ = [a for a in (answer, *answer.beside) if a.decided not in is_done]
     late = next((a for a in open_ if a.longer_helps), None)
     if late is not None:
@@ -124,7 +123,8 @@ def _onwards(answer: Answer) -> Iterable[NextStep]:
         words = AnswerWords(answer)
         yield step("slow", more=words.more, space=words.space)
     is_unsure = not answer.shown and min((s.n for s in answer.used), default=0) > 1
-    if decided is Decided.EQUAL or (decided is Decided.REACHED and not is_unsure):
+    same = (Decided.EQUAL, Decided.NO_EFFECT)
+    if decided in same or (decided is Decided.REACHED and not is_unsure):
         return
     if decided is Decided.OPEN and answer.asked.by_lot and not _is_worth(answer.further_runs):
         return
@@ -138,7 +138,8 @@ def _chance(study: Study, answer: Answer) -> Iterable[NextStep]:
     """More runs of each setting, where they would decide or tell chance at all."""
     if answer.shown:
         yield from _also_reach(answer)
-    if not answer.asked.by_lot or answer.shown or answer.decided is Decided.EQUAL:
+    same = (Decided.EQUAL, Decided.NO_EFFECT)
+    if not answer.asked.by_lot or answer.shown or answer.decided in same:
         return
     fewest, decided = min(s.n for s in answer.used), answer.decided
     compares = len(answer.used) > 1 and answer.asked.better != "neither"

@@ -366,3 +366,31 @@ def test_worse_settings_of_several_keys_stand_in_a_sentence_of_their_own() -> No
     )  # fmt: skip
     said = first_sentence(answered.answered(summary, "height_m", keys))
     assert ". Worse: frequency 20 Hz, friction 0." in said
+
+
+@pytest.mark.parametrize(
+    ("holes", "said"),
+    [
+        ({30: (0.9, 0.99, 0.97), 45: (0.94, 0.99, 0.98)}, "45 Hz may suit both."),
+        ({30: (0.97, 0.98, 0.975), 45: (0.99, 0.985, 0.98)}, "45 Hz suits both."),
+        ({30: (0.0, 0.0, 0.0), 45: (0.0, 0.0, 0.0)}, "The hole18 holds 0 % of what fits for every "
+         "frequency that was tried, 30 Hz to 45 Hz: it is not full."),
+        ({30: (0.6, 0.61, 0.62), 45: (0.4, 0.42, 0.41)}, "What is best for the one is not best for "
+         "the other: pocket 45 Hz, hole18 30 Hz."),
+    ],
+)  # fmt: skip
+def test_what_suits_two_spaces_is_what_is_shown_of_both(
+    holes: dict[float, tuple[float, ...]], said: str
+) -> None:
+    fills = {30: (0.7, 0.72, 0.71), 45: (0.99, 0.985, 0.98)}
+    summary = answered.table(answered.HZ, **{answered.POCKET: fills, answered.HOLE: holes})
+    answer = answered.answered(summary, answered.POCKET, [answered.HZ])
+    assert first_sentence(answer).strip().endswith(said)
+
+
+def test_spaces_that_stay_empty_in_runs_that_are_the_same_are_to_be_turned() -> None:
+    empty = {30: (0.0, 0.0), 45: (0.0, 0.0)}
+    summary = answered.table(answered.HZ, **{answered.POCKET: empty})
+    answer = answered.answered(summary, answered.POCKET, [answered.HZ])
+    assert answer.decided is Decided.NO_EFFECT
+    assert [it.text.split()[0] for it in answer_steps(SandStudy(), answer)] == ["Leave", "Turn"]
