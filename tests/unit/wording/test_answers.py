@@ -234,7 +234,7 @@ def test_no_step_is_refused_or_computed_or_harmful(name: str, word: str) -> None
     ("better", "value", "said"),
     [
         ("smaller", 0.01, "is 0 for every frequency that was tried, 5 to 6 Hz, and stays within"),
-        ("larger", 0.5, "is 0 for every frequency that was tried, 5 to 6 Hz, but misses 0.500."),
+        ("larger", 0.5, "is 0 for every frequency that was tried, 5 to 6 Hz, and misses 0.500."),
     ],
 )
 def test_a_measure_that_is_the_same_everywhere_is_held_against_its_target(
@@ -351,7 +351,7 @@ def test_a_key_without_effect_is_held_against_the_target() -> None:
     summary = answered.table("material", solid_fraction={"a": (0.6,), "b": (0.6,)})
     asked = answered.answered(summary, "solid_fraction", ["material"], by_lot=False).asked
     answer = decide(replace(asked, goal=Goal("solid_fraction", 0.7)), Evidence(summary))
-    said = "are the same; the solid fraction is 0.600, but misses 0.700."
+    said = "are the same; the solid fraction is 0.600, and misses 0.700."
     assert first_sentence(answer).strip().endswith(said)
 
 
