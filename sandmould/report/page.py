@@ -263,10 +263,12 @@ def _render(
 
 def _beyond_table(study: Study, scenario: Any, collected: Collected) -> tuple[Note, ...]:
     """Points of the sweep that the user's table cannot do: no run was planned of them."""
-    if not study.table_limits or not collected.keys:
+    keys = study.sweep.swept
+    if not study.table_limits or not keys:
         return ()
-    there = {setting_text(at) for at, _ in setting_rows(collected.summary, collected.keys)}
-    every = ({key: point[key] for key in collected.keys} for point in points(study.sweep, scenario))
+    # by the sweep's own keys: the runs of a cross-check have their engine besides
+    there = {setting_text(at) for at, _ in setting_rows(collected.of_sweep.summary, keys)}
+    every = ({key: point[key] for key in keys} for point in points(study.sweep, scenario))
     left_out = [point for point in every if setting_text(point) not in there]
     line = beyond_line(left_out, study.table_limits).strip()
     return (Note("Table", line),) if line else ()

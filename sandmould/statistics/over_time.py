@@ -82,7 +82,8 @@ def _swing(course: NDArray[np.float64]) -> float:
 def reached_s(curves: pd.DataFrame, runs: Iterable[str], measure: str, level: float) -> float:
     """Time of vibration from which the mean of runs stays at a level or above; NaN where not.
 
-    0 where it is there from the beginning and at the end: dips between are not counted.
+    That of the first record where the mean is there from then on and at the end: dips between are
+    not counted.
     """
     shaken = _shaken(curves, runs, measure)
     of_runs = [(run[VIBRATION_TIME_S], run[measure]) for _, run in shaken.groupby(RUN)]
@@ -92,7 +93,7 @@ def reached_s(curves: pd.DataFrame, runs: Iterable[str], measure: str, level: fl
     mean = np.mean([np.interp(time_s, *curve) for curve in of_runs], axis=0)
     below = np.flatnonzero(mean < level)
     if mean[0] >= level <= mean[-1]:
-        return 0.0
+        return float(time_s[0])
     return first_reach_s(time_s[below[-1] :], mean[below[-1] :], level)
 
 

@@ -120,10 +120,10 @@ def _said_of(
 ) -> tuple[str, ...]:
     """Findings, the first with the setting of the one run that they are of."""
     row = summary[summary[RUN].astype(str) == run]
-    if row.empty:
+    name, colon, rest = said[0].partition(":")
+    if row.empty or not colon:
         return tuple(said)
     label = setting_text({key: row.iloc[0][key] for key in keys})
-    name, colon, rest = said[0].partition(":")
     return (f"{name}, with {label}{colon}{rest}", *said[1:])
 
 

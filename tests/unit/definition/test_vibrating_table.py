@@ -63,7 +63,9 @@ def test_settings_beyond_the_table_are_left_out(
 
 def test_the_report_names_what_the_table_cannot_do(tmp_path: Path) -> None:
     study = planned(tmp_path, table={"largest_displacement_m": 0.0006}).study.study
-    collected = Collected(pd.DataFrame({HZ: [25, 50, 90]}), pd.DataFrame(), (HZ,))
+    # one of them is computed by another engine, too
+    summary = pd.DataFrame({HZ: [25, 50, 90, 50], "engine.name": ["reference"] * 3 + ["lammps"]})
+    collected = Collected(summary, pd.DataFrame(), (HZ, "engine.name"))
     (note,) = _beyond_table(study, study.scenario, collected)
     assert note.text.endswith("(largest displacement 0.6 mm): 10 Hz.")
     whole = Collected(pd.DataFrame({HZ: [10, 25, 50, 90]}), pd.DataFrame(), (HZ,))

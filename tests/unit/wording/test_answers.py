@@ -278,6 +278,9 @@ def test_what_pouring_fills_is_not_told_as_filled_by_shaking() -> None:
     answer = answered.answered(summary, answered.POCKET, [], curves=pd.DataFrame(rows))
     assert answer.poured
     assert first_sentence(answer).strip().endswith("% of what fits (3 runs), by pouring alone.")
+    late = pd.DataFrame(rows).assign(vibration_time_s=lambda it: it.time_s + 0.1)
+    answer = answered.answered(summary, answered.POCKET, [], curves=late)
+    assert (answer.poured, answer.shortest_s) == (False, pytest.approx(0.1))
 
 
 def test_the_shortest_is_told_only_where_no_run_contradicts_it() -> None:
