@@ -87,7 +87,8 @@ _OF_CAVITY = {
 }
 """Measures of a cavity."""
 _SHOWN = {"m": (1e3, "mm"), "m²": (1e6, "mm²"), "m³": (1e6, "cm³")}
-_PREFIXES = ((1e9, "G"), (1e6, "M"))
+_PREFIXES = ((1e9, 1e9, "G"), (1e6, 1e6, "M"), (1e4, 1e3, "k"))
+"""From which value on, the factor and its letter."""
 _PREFIXED = ("Pa", "N/m")
 """Units in which moduli and stiffnesses of millions are common."""
 
@@ -170,12 +171,18 @@ def number(value: Any, digits: int = 3) -> str:
         return "–"
     if x == 0:
         return "0"
-    size = math.floor(math.log10(abs(x)))
+    size = math.floor(math.log10(float(f"{abs(x):.{digits - 1}e}")))
     if not -4 <= size < 7:
         return f"{x:.{digits - 1}e}".replace("-", "−")
     places = max(0, digits - 1 - size)
     text = f"{x:,.{places}f}".replace(",", "\u202f").replace("-", "−")
     return text.rstrip("0").rstrip(".") if "." in text and float(x).is_integer() else text
+
+
+def as_given(value: float) -> str:
+    """A number that a person wrote, such as a target: without zeros that he did not write."""
+    digits, exponent, power = number(value, 6).partition("e")
+    return (digits.rstrip("0").rstrip(".") if "." in digits else digits) + exponent + power
 
 
 def rounded(value: float) -> float:
@@ -265,7 +272,7 @@ def _text(value: Any) -> str:
         said = _sections_text(text)
         shown = said if 0 < len(said) <= _LONGEST_LIST else text
         return shown if len(shown) <= _LONGEST_LIST else f"{_outline(text)} ({mark(text)})"
-    return text.replace("_", " ")
+    return text.lower() if text in ("True", "False") else text.replace("_", " ")
 
 
 def _sections_text(text: str) -> str:
@@ -319,7 +326,7 @@ def _display_unit(key: str, value: float) -> tuple[float, str]:
     if unit == "m" and 0.0 < abs(value) < 1.0:
         return 1e-3, "mm"
     large = (p for p in _PREFIXES if unit in _PREFIXED and abs(value) >= p[0])
-    factor, prefix = next(large, (1.0, ""))
+    _, factor, prefix = next(large, (0.0, 1.0, ""))
     return factor, prefix + unit
 
 

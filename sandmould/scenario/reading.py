@@ -308,6 +308,8 @@ def _valid(
             units = [unit for unit in units_at(model, ".".join(parts)) if unit != "1"]
             valid += f" in {' or '.join(units)}" if units else ""
             valid += f": {told}" if (told := number_of(given, units)) else ""
+        elif kind == "model_type" and "measure" in keys:
+            valid += f", such as {{measure: {given}}}"
         elif kind == "literal_error" and (new := called(parts[-1], given)):
             valid += f"; {given} is called {new}"
     return valid

@@ -11,6 +11,7 @@ from typing import Any
 
 from sandmould.runs.formatting import (
     OF_BED,
+    as_given,
     distinct_names,
     factor_text,
     filled_space,
@@ -226,7 +227,7 @@ class AnswerWords:
         digits = digits or (2 if self.answer.stand_ins else 3)
         scale = 1.0 if measure.endswith("_fraction") else math.inf
         text = _shown(factor * mean, factor * half_width, digits, scale)
-        return text + (unit if unit == "°" else f" {unit}" if unit else "")
+        return _with_unit(text, unit)
 
     @staticmethod
     def seconds(time_s: float) -> str:
@@ -246,7 +247,10 @@ class AnswerWords:
     def target(self) -> str:
         """The value that is good enough."""
         goal = self.answer.asked.goal
-        return "" if goal is None else self.value(goal.value)
+        if goal is None:
+            return ""
+        factor, unit = shown_unit(self.answer.asked.measure)
+        return _with_unit(as_given(factor * goal.value), unit)
 
     @property
     def within(self) -> str:
@@ -488,6 +492,10 @@ class AnswerWords:
             return Span(low, high, apart=apart)
         before, after = pairs[k]
         return Span(low, high, steepest=(before.label, after.label), apart=apart)
+
+
+def _with_unit(text: str, unit: str) -> str:
+    return text + unit if unit == "°" else f"{text} {unit}".rstrip()
 
 
 def _shown(mean: float, half_width: float, digits: int, scale: float) -> str:

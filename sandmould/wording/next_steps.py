@@ -152,7 +152,8 @@ def _chance(study: Study, answer: Answer) -> Iterable[NextStep]:
         return
     runs = answer.runs_to_reach(answer.best) if answer.may_reach else 0
     if is_short and answer.best and 0 < runs <= WORTH:
-        yield step("reach", f"replicates: {answer.best.planned + runs}", runs=runs)
+        of_one = len(answer.used) == 1
+        yield step("reach", f"replicates: {answer.best.planned + runs}", runs=runs, of_one=of_one)
     if decided is not Decided.OPEN:
         return
     alike, more = answer.alike, answer.further_runs
@@ -185,9 +186,12 @@ def _finer(answer: Answer) -> list[NextStep]:
     refining = answer.refining
     assert refining is not None
     share = refining.error / abs(refining.value) if refining.value else 0.0
-    if share <= FINE_ENOUGH or refining.error <= answer.chance_at_finest:
+    finer = refining.sizes[-1] / 2
+    swept = [setting.values[refining.key] for setting in answer.verdict.settings]
+    is_tried = any(size <= finer for size in swept)  # and gave no value
+    if share <= FINE_ENOUGH or refining.error <= answer.chance_at_finest or is_tried:
         return []
-    sizes = ", ".join(f"{size:g}" for size in (*refining.sizes, refining.sizes[-1] / 2))
+    sizes = ", ".join(f"{size:g}" for size in (*refining.sizes, finer))
     line = f"sweep: {{keys: {{{refining.key}: [{sizes}]}}}}"
     return [step("finer", line, key=name_of(refining.key), percent=100 * share)]
 

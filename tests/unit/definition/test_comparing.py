@@ -282,6 +282,12 @@ def test_what_is_asked_besides_is_checked_as_the_first(
     assert valid in said
 
 
+def test_a_measure_named_alone_is_refused_with_what_to_write(planned: Planned) -> None:
+    said = told(planned, objective={"beside": ["solid_fraction"]})
+    assert "objective.beside.0 = 'solid_fraction'" in said
+    assert said.endswith("such as {measure: solid_fraction}.")
+
+
 @pytest.mark.parametrize(
     ("objective", "goal"),
     [

@@ -76,10 +76,10 @@ def test_full_is_said_where_it_was_asked_alone(name: str) -> None:
         ({30: (0.96,)}, "The pocket is full: it holds 96 % of what fits (its error is unknown: one "
          "run)."),
         ({30: (0.7, 0.71), 45: (0.9, 1.02)}, "45 Hz fills the pocket on average, with 96 % of what "
-         "fits; 2 runs each do not show it."),
-        ({30: (0.7,), 45: (0.96,)}, "By one run each 45 Hz fills the pocket, with 96 % of what "
+         "fits; 2 runs do not show it."),
+        ({30: (0.7,), 45: (0.96,)}, "By one run each, 45 Hz fills the pocket, with 96 % of what "
          "fits: how much of that is chance is unknown."),
-        ({30: (0.7,), 45: (0.6,), 60: (0.5,)}, "By one run each no frequency from 30 Hz to 60 Hz "
+        ({30: (0.7,), 45: (0.6,), 60: (0.5,)}, "By one run each, no frequency from 30 Hz to 60 Hz "
          "fills the pocket: the best, 70 % of what fits, is at 30 Hz. A lower frequency may "
          "change that."),
         ({30: (0.97, 0.98, 0.99), 45: (0.96, 0.97, 0.98)}, "30 Hz fills the pocket, with 98.0 ± "
@@ -103,8 +103,8 @@ def test_a_target_is_reached_by_what_the_runs_show(
 def test_one_setting_beyond_a_target_is_told_by_its_interval() -> None:
     summary = answered.table(answered.HZ, solid_fraction={30: (0.5, 0.7)})
     ways: tuple[tuple[Better, float, str], ...] = (
-        ("larger", 0.62, "misses 0.620"),
-        ("smaller", 0.58, "is beyond 0.580"),
+        ("larger", 0.62, "misses 0.62"),
+        ("smaller", 0.58, "is beyond 0.58"),
     )
     for better, value, said in ways:
         asked = answered.answered(summary, "solid_fraction", [], better).asked
@@ -117,8 +117,8 @@ def test_one_setting_beyond_a_target_is_told_by_its_interval() -> None:
 @pytest.mark.parametrize(
     ("value", "said"),
     [
-        (60.0, "; the value keeps within 60 s."),
-        (52.0, "; whether the value keeps within 52 s is not known."),
+        (60.0, "; the value stays within 60 s."),
+        (52.0, "; whether the value stays within 52 s is not known."),
         (40.0, "; the value is beyond 40 s."),
     ],
 )
@@ -127,6 +127,28 @@ def test_what_sizes_tell_is_held_against_a_target(value: float, said: str) -> No
     goal = Goal(answer.asked.measure, value)
     told = replace(answer, asked=replace(answer.asked, goal=goal, better="smaller"))
     assert said in first_sentence(told)
+
+
+def test_a_size_that_gave_no_value_is_not_advised_again() -> None:
+    values = {0.004: (61.0,), 0.002: (54.3,), 0.001: (math.nan,)}
+    summary = answered.table("element_m", **{answered.FREEZES: values})
+    of_two = answered.answered(summary, answered.FREEZES, ["element_m"], "neither", by_lot=False)
+    assert of_two.refining is not None
+    assert not steps(of_two)
+
+
+def test_sizes_that_change_nothing_are_told_so() -> None:
+    values = dict.fromkeys((0.004, 0.002, 0.001), (52.0,))
+    summary = answered.table("element_m", **{answered.FREEZES: values})
+    same = answered.answered(summary, answered.FREEZES, ["element_m"], "neither", by_lot=False)
+    assert first_sentence(same).strip().endswith("is 52 s for each element from 4 mm to 1 mm.")
+
+
+def test_more_runs_of_one_setting_are_not_those_of_each() -> None:
+    fills = {45: (0.96, 0.97, 0.98)}
+    summary = answered.table(answered.HZ, **{answered.POCKET: fills})
+    (step,) = steps(answered.answered(summary, answered.POCKET, []))
+    assert step.text.startswith("Run it about 2 more times: that would tell whether it reaches")
 
 
 def test_more_runs_are_advised_for_what_reaches_a_target_on_average() -> None:
@@ -234,7 +256,7 @@ def test_no_step_is_refused_or_computed_or_harmful(name: str, word: str) -> None
     ("better", "value", "said"),
     [
         ("smaller", 0.01, "is 0 for every frequency that was tried, 5 to 6 Hz, and stays within"),
-        ("larger", 0.5, "is 0 for every frequency that was tried, 5 to 6 Hz, and misses 0.500."),
+        ("larger", 0.5, "is 0 for every frequency that was tried, 5 to 6 Hz, and misses 0.5."),
     ],
 )
 def test_a_measure_that_is_the_same_everywhere_is_held_against_its_target(
@@ -354,7 +376,7 @@ def test_a_key_without_effect_is_held_against_the_target() -> None:
     summary = answered.table("material", solid_fraction={"a": (0.6,), "b": (0.6,)})
     asked = answered.answered(summary, "solid_fraction", ["material"], by_lot=False).asked
     answer = decide(replace(asked, goal=Goal("solid_fraction", 0.7)), Evidence(summary))
-    said = "are the same; the solid fraction is 0.600, and misses 0.700."
+    said = "are the same; the solid fraction is 0.600, and misses 0.7."
     assert first_sentence(answer).strip().endswith(said)
 
 
