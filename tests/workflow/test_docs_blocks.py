@@ -14,6 +14,7 @@ import typer.main
 import yaml
 
 from sandmould import ROOT
+from sandmould.bad_input import BadInputError
 from sandmould.cli.commands import app
 from sandmould.execution.cluster.settings import read_cluster
 from sandmould.study.plan.build_plan import open_plan
@@ -86,6 +87,20 @@ def test_other_yaml_is_yaml_and_whole_studies_plan(tmp_path: Path) -> None:
     assert len(planned) >= 1
 
 
+def test_the_refusal_that_a_tutorial_shows_is_that_of_today(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    found = blocks("docs/tutorials/first_study.md")
+    (study,) = (block for block in found if block.title)
+    (shown,) = (block.text for block in found if "cannot be used" in block.text)
+    text = study.text.replace("acceleration_g: 1.5,", "acceleration_g: 1.5 g,")
+    Path(study.title).write_text(text, encoding="utf-8")
+    with pytest.raises(BadInputError) as refused:
+        open_plan(Path(study.title))
+    assert f"{refused.value}\n" == shown
+
+
 def commands(page: str) -> list[str]:
     """Calls of the command that a page shows, in blocks and within sentences."""
     text = (ROOT / page).read_text(encoding="utf-8")
@@ -95,7 +110,7 @@ def commands(page: str) -> list[str]:
         if block.language == "sh"
         for line in block.text.splitlines()
     ]
-    shown = [re.sub(r"^(\.venv/bin/|sand/bin/)", "", line) for line in shown]
+    shown = [re.sub(r"^(\.venv/bin/|~/sandmould-env/bin/)", "", line) for line in shown]
     typed = [line for line in shown if line.startswith("sandmould ")]
     return typed + INLINE.findall(BLOCK.sub("", text))
 
