@@ -77,17 +77,7 @@ def make_film(
 ) -> Film | None:
     """Pack the snapshots of a run; frames are left out to keep the budget, grains never.
 
-    Parameters
-    ----------
-    reading : ((k,) float64 s, (k,) float64), optional
-        Times and values of the objective.
-    budget_bytes : int
-        Most that ``data`` may weigh.
-
-    Returns
-    -------
-    Film or None
-        None without a readable snapshot.
+    ``reading``: times, s, and values of the objective. None without a readable snapshot.
     """
     moments = list_moments(run_folder)
     if not moments:
@@ -107,14 +97,8 @@ def within_budget(
 ) -> FilmT:
     """Pack frames evenly over a run, fewer and fewer until they weigh little enough.
 
-    Parameters
-    ----------
-    pack : callable
-        Gives the film of some frames, by their places.
-    total, count : int
-        Frames of the run, and how many are tried first.
-    budget_bytes : int
-        Most that the film's data may weigh; two frames are kept whatever they weigh.
+    ``pack`` gives the film of some frames of ``total``, by their places; ``count`` are tried first,
+    and two are kept whatever they weigh.
     """
     while True:
         film = pack(evenly(total, count).tolist())
@@ -199,13 +183,7 @@ def readings_at(
     time_s: NDArray[np.float64],
     reading: tuple[NDArray[np.float64], NDArray[np.float64]] | None,
 ) -> tuple[float | None, ...]:
-    """Values at each frame, from those that are known; None outside them.
-
-    Parameters
-    ----------
-    time_s : (frames,) float64, s
-    reading : ((k,) float64 s, (k,) float64) or None
-    """
+    """Values at each frame, from those that are known; None outside them."""
     if reading is None or not len(reading[0]):
         return (None,) * len(time_s)
     values = np.interp(time_s, *reading, left=np.nan, right=np.nan)

@@ -215,13 +215,7 @@ class Laid:
 
 
 def lay_out(chart: Chart, size: tuple[int, int]) -> Laid:
-    """Place a chart on a drawing of so many pixels.
-
-    Parameters
-    ----------
-    size : (int, int), px
-        Width and height; rows of settings make the drawing as high as they need.
-    """
+    """Place a chart on a drawing of so many pixels; rows make it as high as they need."""
     width, height = float(size[0]), float(size[1])
     if chart.rows:
         height = 66.0 + 42.0 * len(chart.rows)

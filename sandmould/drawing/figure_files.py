@@ -18,13 +18,7 @@ _HEADING_IN = 0.3
 
 
 def strip(panels: Sequence[tuple[str, str]]) -> bytes:
-    """Pictures side by side under their headings, as one PNG.
-
-    Parameters
-    ----------
-    panels : sequence of (str, str)
-        At least one heading and ``data:`` address, all of one size.
-    """
+    """Pictures of one size (heading, ``data:`` address) side by side, as one PNG."""
     from matplotlib.figure import Figure  # slow to import, and few reports have a strip
     from PIL import Image
 

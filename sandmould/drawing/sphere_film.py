@@ -113,12 +113,7 @@ class SphereFrames:
     """All but the data."""
 
     def packed(self, grains: NDArray[np.int64], frames: Sequence[int]) -> SphereFilm:
-        """Pack some of the grains at some of the frames.
-
-        Parameters
-        ----------
-        grains : (k,) int64
-        """
+        """Pack some of the grains at some of the frames."""
         points = np.append(grains, np.arange(len(self.radius_m), self.place.shape[2]))
         share = np.rint(self.radius_m[grains] / self.film.largest_radius_m * 65535)
         raw = (
@@ -145,12 +140,7 @@ class SphereFrames:
     def light(self, cut_m: float, budget_bytes: int) -> SphereFilm:
         """Pack what a page can hold: frames are left out, and grains far behind the cut.
 
-        Parameters
-        ----------
-        cut_m : float, m
-            y of the plane behind which grains are shown first.
-        budget_bytes : int
-            Most that ``data`` may weigh; two frames are kept whatever they weigh.
+        ``cut_m``: y of the plane behind which grains are shown first.
         """
         grains, slice_m = self._behind(cut_m)
         total = self.place.shape[1]
@@ -163,16 +153,7 @@ class SphereFrames:
     ) -> tuple[SphereFilm, dict[str, str]]:
         """The film for the page, and the script that lies beside it, by file name.
 
-        Parameters
-        ----------
-        folder_href : str
-            Address of the folder of scripts, seen from the page.
-
-        Returns
-        -------
-        SphereFilm
-        dict of str to str
-            Empty where the page holds all there is.
+        No script where the page holds all there is; ``folder_href``: its folder, seen from there.
         """
         light, total = self.light(cut_m, budget_bytes), self.place.shape[1]
         if light.slice_m is None and len(light.time_s) == total:
@@ -207,15 +188,8 @@ def sphere_frames(
 ) -> SphereFrames:
     """Quantise and shade all grains of a run.
 
-    Parameters
-    ----------
-    snapshots : sequence of Snapshot or Moment
-        At least one, in order of time; moments are read one at a time. Thinned so that all grains
-        fit beside the page.
-    run, label : str
-        Name of the run, and how the page calls it.
-    scale : DensityScale
-        Ends of the shades of density.
+    ``snapshots``: at least one, in order of time, thinned so that all grains fit beside the page;
+    moments are read one at a time.
     """
     most = max(2, min(MOST_FRAMES, MOST_BESIDE // max(1, len(_read(snapshots[-1]).id))))
     chosen = [snapshots[i] for i in evenly(len(snapshots), most).tolist()]

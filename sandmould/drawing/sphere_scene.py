@@ -65,15 +65,7 @@ class SurfaceField:
 def sphere_scene(
     scenario: Scenario, top_m: float, fields: Sequence[SurfaceField] = ()
 ) -> dict[str, object]:
-    """The scene for the page's 3D view, in m.
-
-    Parameters
-    ----------
-    scenario : Scenario
-        In three dimensions.
-    fields : sequence of SurfaceField, optional
-        By which the solids can be coloured.
-    """
+    """The scene for the page's 3D view, in m; its solids can be coloured by fields."""
     box, pattern = scenario.box, scenario.pattern
     gate = scenario.gate.name if scenario.gate else None
     bends = "" if pattern is None else pattern.name
@@ -93,15 +85,7 @@ def sphere_scene(
 def solid_scene(
     solids: Iterable[Body], low_m: Array, high_m: Array, fields: Sequence[SurfaceField] = ()
 ) -> dict[str, object]:
-    """Solids in a box without sand, for the same view.
-
-    Parameters
-    ----------
-    solids : iterable of Body
-        Blocks and meshes.
-    low_m, high_m : (3,) float64, m
-        Corners of the box, which need not be at the origin.
-    """
+    """Blocks and meshes in a box without sand, which need not be at the origin; the same view."""
     moved = [replace(field, place_m=field.place_m - low_m) for field in fields]
     packed = []
     for solid in solids:

@@ -24,15 +24,7 @@ MOST_RUNS = 600
 def drawn_part(collected: Collected, verdict: Verdict) -> tuple[Collected, Verdict]:
     """What charts show: everything, or settings evenly over the sweep with the two best.
 
-    Parameters
-    ----------
-    collected : Collected
-        Runs that the verdict was made from.
-
-    Returns
-    -------
-    (Collected, Verdict)
-        Means, intervals and comparisons are those of all runs.
+    Means, intervals and comparisons are those of all runs.
     """
     summary, settings = collected.summary, verdict.settings
     if len(settings) <= MOST_SETTINGS and len(summary) <= MOST_RUNS:

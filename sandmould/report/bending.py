@@ -174,10 +174,7 @@ def paper_sentences(scenario: Scenario, collected: Collected, pictured_run: str)
 def deflection_chart(collected: Collected, verdict: Verdict) -> Chart | None:
     """Deflection of the tip over the whole run, clocks set to the start of vibration.
 
-    Returns
-    -------
-    Chart or None
-        Each run thin, the mean of each setting thick, between its least and greatest run an area.
+    Each run thin, the mean of each setting thick, between its least and greatest run an area.
     """
     drawn, part = drawn_part(collected, verdict)
     if TIP not in drawn.curves:

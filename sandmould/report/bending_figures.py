@@ -140,10 +140,7 @@ _STYLES = {"filled": ("after filling", "#D55E00"), "final": ("at the end", "#007
 def draw_outlines(run_folder: Path, scenario: Scenario) -> tuple[str, str]:
     """Draw the shapes of one run, in 3D cut through the middle; displacements are not magnified.
 
-    Returns
-    -------
-    (str, str)
-        PNG as a ``data:`` address and what it shows; both empty where the run left no shape.
+    PNG as a ``data:`` address and what it shows; both empty where the run left no shape.
     """
     pattern = scenario.pattern
     assert pattern is not None

@@ -36,17 +36,9 @@ SIGNS = {
 
 
 def stability_map(summary: pd.DataFrame, keys: Sequence[str]) -> str:
-    """Draw the map, a panel for each c_poi and each value of what else is swept.
+    """Draw the map of runs that ended, a panel for each c_poi and each value of what else is swept.
 
-    Parameters
-    ----------
-    summary : DataFrame
-        Runs that ended, each with its classification.
-
-    Returns
-    -------
-    str
-        A ``data:`` address; empty unless time step and relaxations are swept.
+    A ``data:`` address; empty unless time step and relaxations are swept.
     """
     if not set(AXES) <= set(keys) or summary.empty:
         return ""
@@ -172,14 +164,7 @@ def pressure_history(
 def extremes(x: NDArray[np.float64], y: NDArray[np.float64]) -> NDArray[np.float64]:
     """The lowest and the highest point of each part of a curve, in their order.
 
-    Parameters
-    ----------
-    x, y : (n,) float64
-
-    Returns
-    -------
-    (k, 2) float64
-        All points where there are at most two a part; NaN is passed over.
+    (k, 2) float64: all points where there are at most two a part; NaN is passed over.
     """
     points = np.column_stack([x, y])[np.isfinite(y)]
     if len(points) <= 2 * BINS:

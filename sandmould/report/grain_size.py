@@ -46,14 +46,7 @@ def grain_size_pages(
 ) -> GrainSizePages | None:
     """Compare the runs with coarser grains with those of the sweep; None without such runs.
 
-    Parameters
-    ----------
-    collected : Collected
-        Of all runs.
-    scenario : Scenario
-        Of the run that is shown.
-    best : str
-        Label of the best setting.
+    ``scenario``: of the run that is shown; ``best``: label of the best setting.
     """
     objective = study.objective
     aims = aims_beside(objective.measure, objective.beside, collected.summary)

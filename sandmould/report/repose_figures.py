@@ -87,14 +87,8 @@ def draw_map(
 ) -> str:  # fmt: skip
     """Draw a measure over the two swept keys as contours, with the runs and the iso-lines.
 
-    Parameters
-    ----------
-    keys : tuple of str
-        The second goes along x, as in Figure 12 of the paper.
-    points : (n, 2) float64
-        Values of the keys of the runs.
-    sands : sequence of CalibratedSand
-        Whose lines of this measure are drawn with their bands.
+    The second key goes along x, as in Figure 12 of the paper. ``points``: (n, 2) float64, values of
+    the keys of the runs; ``sands``: whose lines of this measure are drawn with their bands.
     """
     figure = Figure(figsize=(7.6, 5.2), dpi=110, layout="constrained")
     ax = figure.add_subplot()

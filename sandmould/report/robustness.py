@@ -59,12 +59,7 @@ def robustness_pages(
 ) -> RobustnessPages | None:
     """Assess and draw the controls of a study; None before they are chosen, or without any.
 
-    Parameters
-    ----------
-    collected : Collected
-        Of all runs.
-    scenario : Scenario
-        Of any run of the sweep.
+    ``scenario``: of any run of the sweep.
     """
     key = frequency_key(study.sweep)
     certified_hz = read_rounds(study_folder, study).certified_hz

@@ -52,20 +52,9 @@ def sand_pages(
     href: str,
     own_measures: Iterable[str] = (),
 ) -> dict[str, Any]:
-    """Draw everything that a study of sand shows.
+    """Draw everything that a study of sand shows, as ``sand.html`` names it; empty without data.
 
-    Parameters
-    ----------
-    scenario : Scenario
-        Of the run that is shown: the best one.
-    href : str
-        Address of the study's folder, seen from the report.
-
-    Returns
-    -------
-    dict of str to any
-        What ``sand.html`` names, empty without data; ``beside`` has films of all grains, scripts
-        that lie beside the page, by file name.
+    ``beside`` has films of all grains: scripts that lie beside the page, by file name.
     """
     roles = pictured_runs(study_folder, collected.summary, verdict)
     run = next(iter(roles.values()), "")

@@ -104,17 +104,8 @@ def share_of_what_fits(
 ) -> float:
     """How much of what a tube or cavity could hold is in it, as the mean of finished runs.
 
-    Parameters
-    ----------
-    measure : str
-        The fill of that space.
-    values : mapping of str to object, optional
-        A setting; all settings together unless given.
-
-    Returns
-    -------
-    float
-        1 where it is packed as densely as the bed; NaN where runs do not tell.
+    ``measure``: the fill of that space; ``values``: a setting, all together unless given. 1 where
+    it is packed as densely as the bed; NaN where runs do not tell.
     """
     column = filled_space(measure) + OF_BED
     if column not in summary:

@@ -62,12 +62,7 @@ def step(name: str, line: str = "", command: str = "", **values: object) -> Next
 def with_file(steps: Sequence[NextStep], owner: str | None, shipped: str, name: str) -> NextSteps:
     """Say which file the lines of steps belong in.
 
-    Parameters
-    ----------
-    owner : str or None
-        The user's file of the study; None where nobody knows it.
-    shipped : str
-        Name of the shipped study that it is; empty where it is the user's.
+    ``owner``: the user's file of the study, if known; ``shipped``: the shipped study that it is.
     """
     file = OWN_FILE if shipped or owner is None else owner
     below = f" a file {file} below based_on: {shipped or name}"
