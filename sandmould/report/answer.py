@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
 from dataclasses import dataclass
 
 import pandas as pd
@@ -24,7 +23,7 @@ from sandmould.runs.formatting import (
     with_margin,
 )
 from sandmould.runs.templates import Note, worded
-from sandmould.scenario.drive import DISPLACEMENT, VELOCITY, BoxDrive
+from sandmould.scenario.drive import BoxDrive
 from sandmould.statistics.answer import Answer
 from sandmould.statistics.config import FULL_SHARE
 from sandmould.statistics.evidence import usable_values
@@ -84,7 +83,7 @@ def optimum_headline(
         name = "" if len(optimum.keys) == 1 and unit_of(key) else f"{name_of(key)} "
         at = f"{name}{value_text(key, float(f'{value:.3g}'))}"
         interval = f"95 %: {range_text(key, low, float(f'{high:.3g}'))}"
-        drive = _as_drive(drive_at(summary, optimum.keys, optimum.setting))
+        drive = drive_at(summary, optimum.keys, optimum.setting)
         places.append(place_text(at, optimum.keys, drive, interval))
     share = share_at(optimum, summary, answer.verdict.measure)
     said = worded(
@@ -102,14 +101,6 @@ def share_at(optimum: Optimum, summary: pd.DataFrame, measure: str) -> float:
     """
     mean = float(usable_values(summary, measure).mean())
     return share_of_what_fits(summary, measure) * optimum.value[0] / mean
-
-
-def _as_drive(drive: Mapping[str, float] | None) -> BoxDrive | None:
-    """The motion that has these amplitudes."""
-    if drive is None or not drive[DISPLACEMENT] > 0.0:
-        return None
-    frequency_hz = drive[VELOCITY] / drive[DISPLACEMENT] / (2 * math.pi)
-    return BoxDrive(frequency_hz, drive[DISPLACEMENT])
 
 
 def figures_of(answer: Answer, summary: pd.DataFrame) -> tuple[KeyNumber, ...]:
@@ -155,7 +146,6 @@ def optimum_choice(
     optimum, advised = pages.optimum, pages.recommendation
     if optimum is None or is_artefact or (advised is not None and advised.interval_hz is None):
         return ()
-    drive = _as_drive(drive_at(summary, optimum.keys, optimum.setting))
     of_keys = [
         KeyNumber(
             value_text(key, rounded(value)),
@@ -167,7 +157,7 @@ def optimum_choice(
     ]
     factor, what = display_scale(verdict.measure)
     mean, se = optimum.value
-    of_keys += _motion_figures(drive)
+    of_keys += _motion_figures(drive_at(summary, optimum.keys, optimum.setting))
     share = share_at(optimum, summary, verdict.measure)
     if math.isfinite(share):
         of_keys.append(_share_figure(share, verdict.measure, "of what fits in, about"))

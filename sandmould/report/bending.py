@@ -21,7 +21,7 @@ from sandmould.pattern_fe.coupling.loop_verdict import LoopVerdict, study_senten
 from sandmould.pattern_fe.quality import mesh_sentence
 from sandmould.pattern_fe.scene import pattern_of
 from sandmould.report.bending_figures import coupling_map, draw_distances, draw_outlines
-from sandmould.report.curves import runs_of, setting_tints, time_chart
+from sandmould.report.curves import runs_by_setting, setting_tints, time_chart
 from sandmould.report.tables import Cell, Column, Table
 from sandmould.runs.columns import RUN, SOLID_FRACTION, TIME_S, VIBRATION_TIME_S
 from sandmould.runs.formatting import number, setting_text
@@ -188,9 +188,9 @@ def deflection_chart(collected: Collected, verdict: Verdict) -> Chart | None:
     if chart is None:
         return None
     tint = setting_tints(part, collected.keys)
-    areas = []
+    areas, rows_of = [], runs_by_setting(drawn.summary, collected.keys)
     for setting in part.settings:
-        rows = runs_of(drawn.summary, setting)
+        rows = rows_of[setting.label]
         used = rows.loc[left_out(rows, TIP) == "", RUN]
         area = _area(aligned[aligned[RUN].isin(used)])
         if area is not None:

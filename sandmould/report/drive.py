@@ -9,10 +9,10 @@ import numpy as np
 import pandas as pd
 
 from sandmould.runs.columns import finished
-from sandmould.scenario.drive import ACCELERATION, DISPLACEMENT, VELOCITY, BoxDrive, laid_down_drive
+from sandmould.scenario.drive import DISPLACEMENT, VELOCITY, BoxDrive, laid_down_drive
 from sandmould.scenario.scenario import Scenario
 
-_COLUMNS = (DISPLACEMENT, VELOCITY, ACCELERATION)
+_COLUMNS = (DISPLACEMENT, VELOCITY)
 
 
 def drive_of(scenario: Scenario, runs: pd.DataFrame) -> BoxDrive | None:
@@ -32,22 +32,12 @@ def drive_of(scenario: Scenario, runs: pd.DataFrame) -> BoxDrive | None:
 
 def drive_at(
     summary: pd.DataFrame, keys: Sequence[str], setting: Mapping[str, float]
-) -> dict[str, float] | None:
-    """Amplitudes of the drive between the settings of a sweep; None where runs have none.
+) -> BoxDrive | None:
+    """The drive between the settings of a sweep; None where runs have none.
 
-    Parameters
-    ----------
-    summary : DataFrame
-        One row a run.
-    setting : mapping of str to float
-        A value of each key.
-
-    Returns
-    -------
-    dict of str to float, or None
-        By ``DISPLACEMENT``, ``VELOCITY`` and ``ACCELERATION``. Over one key logarithms are
-        interpolated between the means of its settings, which is exact for an amplitude that is
-        held. Over several keys it is the nearest setting's, each key over its range.
+    Over one key logarithms are interpolated between the means of its settings, which is exact for
+    an amplitude that is held. Over several keys it is the nearest setting's, each key over its
+    range.
     """
     if not all(column in summary for column in _COLUMNS):
         return None
@@ -64,4 +54,7 @@ def drive_at(
     else:
         width = np.maximum(np.ptp(at, axis=0), np.finfo(float).tiny)
         found = values[int((((at - wanted) / width) ** 2).sum(axis=1).argmin())]
-    return dict(zip(_COLUMNS, found.tolist(), strict=True))
+    displacement_m, velocity_m_s = found.tolist()
+    if not displacement_m > 0.0:
+        return None
+    return BoxDrive(velocity_m_s / displacement_m / (2 * math.pi), displacement_m)

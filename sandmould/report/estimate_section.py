@@ -14,8 +14,7 @@ from sandmould.definition.study import Study
 from sandmould.drawing.figure_files import pictures, strip
 from sandmould.report.kinds.kind import Findings
 from sandmould.report.kinds.registry import report_of
-from sandmould.report.pictured_runs import Heap
-from sandmould.report.tables import Cell, Column, Table
+from sandmould.report.tables import Cell, Column, ReportPicture, Table
 from sandmould.runs.columns import CPU_S, RUN, total_s
 from sandmould.runs.formatting import name_of, number, seconds, titled, unit_of, with_margin
 from sandmould.runs.templates import sentences, worded
@@ -49,7 +48,7 @@ class EstimatePages:
     sentences: tuple[str, ...]
     sound: bool
     """Whether the study's question is answered."""
-    heaps: tuple[Heap, ...]
+    heaps: tuple[ReportPicture, ...]
     map: Table | None
     map_picture: str
     sands: tuple[SandEstimate, ...]
@@ -106,7 +105,7 @@ def estimate_figures(pages: EstimatePages) -> dict[str, bytes]:
         map=pages.map_picture, **{f"posterior_{sand.name}": sand.posterior for sand in pages.sands}
     )
     if pages.heaps:
-        files["heaps"] = strip([(heap.heading, heap.picture) for heap in pages.heaps])
+        files["heaps"] = strip([(heap.caption, heap.address) for heap in pages.heaps])
     return files
 
 

@@ -11,14 +11,14 @@ from sandmould.kinds.sand.narrow import narrow_spaces
 from sandmould.report.tables import Cell, Column, Table
 from sandmould.runs.columns import RUN, VIBRATION_TIME_S, during_vibration
 from sandmould.runs.formatting import display_number, display_range, name_of
+from sandmould.runs.templates import sentences
 from sandmould.scenario.scenario import Scenario
 from sandmould.statistics.decision import aims_beside
-from sandmould.statistics.grain_change import GrainChange, grain_changes
+from sandmould.statistics.grain_change import GrainChange, grain_changes, order_of
 from sandmould.statistics.grain_check import FACTOR
 from sandmould.statistics.over_time import first_reach_s
 from sandmould.study.collect import Collected
 from sandmould.study.robustness.controls import COARSER
-from sandmould.wording.grain_size import grain_sentences
 
 FILLED = 0.9
 """Share of its last fill at which a cavity counts as filled."""
@@ -63,8 +63,16 @@ def grain_size_pages(
     narrow = [name for space in narrow_spaces(scenario) for name in space.names]
     beside = [c for c in changes if c.measure in asked[1:] and c.label == best]
     short, said = (
-        grain_sentences(of_objective, beside, objective.better, narrow, is_short)
-        for is_short in (True, False)
+        sentences(
+            "grain_size.j2",
+            changes=of_objective,
+            shown=[*told, *beside],
+            factor=f"{FACTOR:g}",
+            two=len(of_objective) > 1,
+            order=order_of(*of_objective[:2], objective.better) if len(of_objective) > 1 else "",
+            narrow=narrow,
+        )
+        for told in (of_objective[:1], of_objective)
     )
     return GrainSizePages(short, said, _table(changes))
 

@@ -19,9 +19,8 @@ from sandmould.definition.study import Study
 from sandmould.definition.sweep import points
 from sandmould.drawing.animation import BUDGET_BYTES
 from sandmould.drawing.chart import NARROW, SMALL, WIDE, Chart, lay_out
-from sandmould.drawing.figure_files import numbered, write_figures
+from sandmould.drawing.figure_files import numbered, page_environment, write_figures
 from sandmould.drawing.small_multiples import small_multiples
-from sandmould.drawing.templates import page_environment
 from sandmould.drawing.thinning import drawn_note, drawn_part, listed_settings
 from sandmould.kinds.kind import AnyScenario
 from sandmould.kinds.registry import kind_named
@@ -34,13 +33,12 @@ from sandmould.report.answer import (
     table_of,
 )
 from sandmould.report.bed_mode import BedMode
-from sandmould.report.curves import objective_charts
+from sandmould.report.curves import objective_charts, pictured_runs
 from sandmould.report.estimate_section import EstimatePages, estimate_figures, estimate_pages
 from sandmould.report.kinds.kind import Findings, KindPages
 from sandmould.report.kinds.registry import report_of
 from sandmould.report.method import own_measures_method, provenance_rows, statistics_method
 from sandmould.report.optimum import OptimumPages, effort_sentence, optimum_pages, with_surface
-from sandmould.report.pictured_runs import pictured_runs
 from sandmould.report.robustness import RobustnessPages
 from sandmould.report.tables import KeyNumber, data_files, key_numbers, runs_table, settings_table
 from sandmould.runs.columns import DETAIL, RUN, finished

@@ -18,7 +18,7 @@ from sandmould.drawing.figures import cut_m, panel, png
 from sandmould.engines.snapshot import Snapshot
 from sandmould.kinds.sand.moments import list_moments
 from sandmould.kinds.sand.outflow import slopes
-from sandmould.report.pictured_runs import Heap
+from sandmould.report.tables import ReportPicture
 from sandmould.runs.columns import RUN
 from sandmould.runs.formatting import name_of, number, unit_of
 from sandmould.scenario.scenario import Scenario
@@ -146,7 +146,7 @@ PICTURED_HEAPS = 3
 
 def steepest_heaps(
     study_folder: Path, summary: pd.DataFrame, verdict: Verdict, scenario: Scenario
-) -> tuple[Heap, ...]:
+) -> tuple[ReportPicture, ...]:
     """Draw runs with the least, the middle and the steepest slope; none without a level gate."""
     if scenario.gate is None or not scenario.gate.is_level:
         return ()
@@ -161,5 +161,6 @@ def steepest_heaps(
         sand = moments[-1].load()
         heading = f"{number(values[index])}°: {run}"
         picture = draw_heap(sand, scenario, 1.02 * scenario.scene.top_m)
-        heaps.append(Heap(heading, picture, f"Heap and hopper of run {run} with fitted lines"))
+        alt = f"Heap and hopper of run {run} with fitted lines"
+        heaps.append(ReportPicture(picture, alt, heading))
     return tuple(heaps)

@@ -21,8 +21,7 @@ from sandmould.drawing.sphere_film import SphereFilm, sphere_frames
 from sandmould.drawing.sphere_scene import SurfaceField, sphere_scene
 from sandmould.engines.snapshot import Snapshot
 from sandmould.kinds.sand.moments import MOMENTS, Moment, list_moments, nearest
-from sandmould.report.pictured_runs import pictured_runs
-from sandmould.report.time_series import measure_curves
+from sandmould.report.curves import measure_curves, pictured_runs
 from sandmould.runs.columns import (
     BED_HEIGHT_M,
     RUN,

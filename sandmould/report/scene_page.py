@@ -13,6 +13,7 @@ from sandmould.analysis.freezing_plots import draw_part
 from sandmould.analysis.plots import LAYER_COLOURS
 from sandmould.bad_input import BadInputError, Problem
 from sandmould.casting.arpm.scene import solids_of
+from sandmould.drawing.figure_files import page_environment
 from sandmould.drawing.figures import (
     DensityScale,
     cut_m,
@@ -23,7 +24,6 @@ from sandmould.drawing.figures import (
 )
 from sandmould.drawing.sphere_film import SphereFilm, bare_film, sphere_frames
 from sandmould.drawing.sphere_scene import solid_scene, sphere_scene
-from sandmould.drawing.templates import page_environment
 from sandmould.engines.snapshot import Snapshot
 from sandmould.report.cast_fields import distance_from
 from sandmould.runs.files import replaced

@@ -71,6 +71,16 @@ class KeyNumber:
 
 
 @dataclass(frozen=True)
+class ReportPicture:
+    """A picture of a page with what it shows."""
+
+    address: str
+    """A ``data:`` address."""
+    alt: str
+    caption: str
+
+
+@dataclass(frozen=True)
 class Cell:
     """What a cell shows and what it is sorted by."""
 

@@ -33,15 +33,15 @@ from sandmould.drawing.animation import evenly
 from sandmould.drawing.figure_files import numbered, pictures
 from sandmould.drawing.figures import png
 from sandmould.drawing.flow_film import SHADES, make_flow_film
+from sandmould.report.curves import measure_curves
 from sandmould.report.flow_charts import (
     condition_text,
     pressure_history,
     said_of,
     stability_map,
 )
-from sandmould.report.kinds.kind import Findings, FirstPicture, KindPages, KindReport
-from sandmould.report.tables import Cell, Column, Table
-from sandmould.report.time_series import measure_curves
+from sandmould.report.kinds.kind import Findings, KindPages, KindReport
+from sandmould.report.tables import Cell, Column, ReportPicture, Table
 from sandmould.runs.columns import CLASSIFICATION, DETAIL, HOPS, OUTCOME_CODE, RUN
 from sandmould.runs.formatting import name_of, number, setting_text
 from sandmould.runs.templates import Note, notes, sentences, worded
@@ -137,12 +137,12 @@ def _pages(findings: Findings[MetalFlow], film_budget_bytes: int) -> KindPages:
     )
 
 
-def _first_picture(calmest: Sequence[_PicturedRun], highest_pa: float) -> FirstPicture | None:
+def _first_picture(calmest: Sequence[_PicturedRun], highest_pa: float) -> ReportPicture | None:
     """The metal at the end of the calmest run; None where no run has left fields."""
     for run in calmest:
         alt = f"Particles of run {run.run} at its end, coloured by pressure"
         caption = f"{run.label}, at its end, coloured by pressure."
-        return FirstPicture(_fields([run], highest_pa), alt, caption)
+        return ReportPicture(_fields([run], highest_pa), alt, caption)
     return None
 
 

@@ -10,16 +10,17 @@ from sandmould.drawing.chart import Chart
 from sandmould.drawing.figure_files import pictures, strip
 from sandmould.kinds.sand.narrow import narrow_spaces
 from sandmould.report.bed_mode import bed_mode
+from sandmould.report.curves import curve_figures
 from sandmould.report.drive import drive_of
 from sandmould.report.filling import FillingPages, filling_pages
 from sandmould.report.grain_size import grain_size_pages
-from sandmould.report.kinds.kind import Findings, FirstPicture, KindPages, KindReport
+from sandmould.report.kinds.kind import Findings, KindPages, KindReport
 from sandmould.report.loose_sand import loose_sand_pages
 from sandmould.report.method import measured_when, sand_method
 from sandmould.report.repose_figures import steepest_heaps
 from sandmould.report.robustness import robustness_pages
 from sandmould.report.sand import film_scene, sand_pages
-from sandmould.report.time_series import curve_figures
+from sandmould.report.tables import ReportPicture
 from sandmould.runs.columns import (
     LEAST_LIMIT_S,
     OVERLAP_P99_FRACTION,
@@ -101,7 +102,7 @@ def _pages(findings: Findings[Scenario], film_budget_bytes: int) -> KindPages:
 
 def _first_picture(
     pages: dict[str, Any], verdict: Verdict, collected: Collected
-) -> FirstPicture | None:
+) -> ReportPicture | None:
     """The sand at its end; None without a snapshot."""
     if not pages["panels"]:
         return None
@@ -110,7 +111,7 @@ def _first_picture(
     values = {key: of_run.iloc[0][key] for key in collected.keys}
     said = f"the sand coloured by layer of fill, {last['heading']}."
     caption = f"{setting_text(values)}: {said}" if values else said.capitalize()
-    return FirstPicture(last["by_layer"], last["alt"], caption)
+    return ReportPicture(last["by_layer"], last["alt"], caption)
 
 
 def _steps_above_limit(summary: pd.DataFrame) -> tuple[str, ...]:

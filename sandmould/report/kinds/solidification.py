@@ -18,9 +18,9 @@ from sandmould.drawing.figure_files import numbered, pictures
 from sandmould.drawing.sphere_film import bare_film
 from sandmould.kinds.solidification.kind import SolidificationStudy
 from sandmould.report.cast_fields import cast_fields, cast_scene
-from sandmould.report.kinds.kind import Findings, FirstPicture, KindPages, KindReport
-from sandmould.report.tables import Cell, Column, Table
-from sandmould.report.time_series import curve_figures, measure_curves
+from sandmould.report.curves import curve_figures, measure_curves
+from sandmould.report.kinds.kind import Findings, KindPages, KindReport
+from sandmould.report.tables import Cell, Column, ReportPicture, Table
 from sandmould.runs.columns import CPU_S, DETAIL, RUN, SOLIDIFICATION_TIME_S, TIME_S, finished
 from sandmould.runs.formatting import is_number, listed, name_of, number, seconds, setting_text
 from sandmould.runs.templates import Note, notes, worded
@@ -103,7 +103,7 @@ def _pages(findings: Findings[Solidification], film_budget_bytes: int) -> KindPa
             **numbered("error_cost", error_cost),
             **curve_figures([*([cooling] if cooling else []), *curves]),
         },
-        picture=FirstPicture(*first) if first[0] else None,
+        picture=ReportPicture(*first) if first[0] else None,
         findings=tuple(t for t in said if t not in first_said) if is_one else said,
         answer=_of_one(findings, first_said) if is_one else cheapest,
         grounds=notes(
