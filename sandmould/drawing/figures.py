@@ -9,7 +9,6 @@ import base64
 import io
 import math
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
 
 import numpy as np
 from matplotlib import rc_context
@@ -185,14 +184,6 @@ def _dimension(ax: Axes, a: tuple[float, float], b: tuple[float, float], text: s
     )
 
 
-@dataclass(frozen=True)
-class DensityScale:
-    """Ends of the colours of apparent density, kg/m3."""
-
-    low_kg_m3: float
-    high_kg_m3: float
-
-
 def draw_layers(
     snapshots: Sequence[Snapshot], scenario: Scenario, height_m: float
 ) -> tuple[str, ...]:
@@ -210,15 +201,16 @@ def draw_layers(
 
 def draw_densities(
     snapshots: Sequence[Snapshot], scenario: Scenario, height_m: float
-) -> tuple[tuple[str, ...], DensityScale, tuple[float, ...]]:
+) -> tuple[tuple[str, ...], tuple[float, float], tuple[float, ...]]:
     """Draw each snapshot with its grains coloured by apparent density, on one scale.
 
     Returns
     -------
     tuple of str
         PNG as ``data:`` addresses.
-    DensityScale
-        From the 5th to the 98th percentile of all grains: the loose surface would dim the rest.
+    (float, float), kg/m3
+        Ends of the colours: the 5th and the 98th percentile of all grains, since the loose surface
+        would dim the rest.
     tuple of float, kg/m3
         Median of each snapshot.
     """
@@ -246,7 +238,7 @@ def draw_densities(
 
     pictures = tuple(panel(s, scenario, height_m, densities) for s in snapshots)
     medians = tuple(float(np.nanmedian(f)) if len(f) else math.nan for f in density_kg_m3)
-    return pictures, DensityScale(low, high), medians
+    return pictures, (low, high), medians
 
 
 def panel(
@@ -284,12 +276,7 @@ def _scale_bar(ax: Axes, width: float, height: float) -> None:
 
 def png(figure: Figure, has_scales: bool = False) -> str:
     """A figure as a PNG of few colours, a ``data:`` address; with scales of colours it has all."""
-    return picture_address(png_bytes(figure, has_scales))
-
-
-def picture_address(content: bytes) -> str:
-    """A PNG as a ``data:`` address."""
-    return _address("image/png", content)
+    return _address("image/png", png_bytes(figure, has_scales))
 
 
 def png_bytes(figure: Figure, has_scales: bool = False) -> bytes:

@@ -21,18 +21,11 @@ _POINTS, _POINTS_BEHIND = 200, 50
 
 
 @dataclass(frozen=True)
-class SettingPanel:
-    """One setting before all others."""
-
-    title: str
-    laid: Laid
-
-
-@dataclass(frozen=True)
 class SmallMultiples:
     """Panels with the same axes, or one chart where all curves lie on each other."""
 
-    panels: tuple[SettingPanel, ...]
+    panels: tuple[tuple[str, Laid], ...]
+    """One setting before all others, with its label."""
     together: tuple[Laid, Laid] | None
     """The chart for a wide page and for a phone, without labels."""
     note: str
@@ -64,8 +57,7 @@ def small_multiples(chart: Chart) -> SmallMultiples | None:
     whole = lay_out(chart, PANEL)
     frame = (whole.x.low, whole.x.high), (whole.y.low, whole.y.high)
     panels = tuple(
-        SettingPanel(mean.group, lay_out(_alone(chart, mean, behind, frame), PANEL))
-        for mean in shown
+        (mean.group, lay_out(_alone(chart, mean, behind, frame), PANEL)) for mean in shown
     )
     left_out = len(means) - len(shown)
     note = f"Shown are {len(shown)} of {len(means)} settings." if left_out else ""

@@ -28,7 +28,6 @@ from sandmould.drawing.animation import (
     split_bytes,
     within_budget,
 )
-from sandmould.drawing.figures import DensityScale
 from sandmould.engines.snapshot import Snapshot, scene_at
 from sandmould.kinds.sand.moments import Moment
 from sandmould.scenario.scenario import Scenario
@@ -49,32 +48,35 @@ UNKNOWN = 255
 
 @dataclass(frozen=True)
 class SphereFilm(PackedFilm):
-    """Frames of one run as the page reads them; coordinates are the box's own, in m."""
+    """Frames of one run as the page reads them; coordinates are the box's own, in m.
+
+    Of no grain unless given, for a view of solids alone.
+    """
 
     run: str
-    label: str
-    grains: int
-    of_grains: int
+    label: str = ""
+    grains: int = 0
+    of_grains: int = 0
     """Grains of the run; fewer are shown where the film is light."""
-    vertices: int
+    vertices: int = 0
     """Points after the grains: vertices of the pattern that bends, 0 without one."""
-    time_s: tuple[float, ...]
-    vibration_time_s: tuple[float | None, ...]
+    time_s: tuple[float, ...] = (0.0,)
+    vibration_time_s: tuple[float | None, ...] = (None,)
     """None before the first vibration."""
-    stage: tuple[str, ...]
-    is_filling: tuple[bool, ...]
-    reading: tuple[float | None, ...]
+    stage: tuple[str, ...] = ("",)
+    is_filling: tuple[bool, ...] = (False,)
+    reading: tuple[float | None, ...] = (None,)
     """The objective at each frame, if known."""
-    origin_m: tuple[float, ...]
-    quantum_m: float
-    largest_radius_m: float
-    slice_m: tuple[float, float] | None
+    origin_m: tuple[float, ...] = (0.0, 0.0, 0.0)
+    quantum_m: float = 1.0
+    largest_radius_m: float = 1.0
+    slice_m: tuple[float, float] | None = None
     """Least and greatest y of the grains that are shown, where not all are."""
-    density_kg_m3: tuple[float, float]
+    density_kg_m3: tuple[float, float] = (0.0, 1.0)
     """Densities of shades 0 and 254."""
-    fastest_m_s: float
+    fastest_m_s: float = 1.0
     """Speed of shade 254 and above."""
-    data: str
+    data: str = encoded(b"")
     """Base64 of deflated bytes: coordinates by axis, frame and point; radii of the grains (uint16,
     shares of the largest, low bytes first); their layers (uint8); shades of density and of speed
     by frame and grain (uint8)."""
@@ -82,21 +84,6 @@ class SphereFilm(PackedFilm):
     """Address of the script with all grains and frames; empty where this film has them."""
     beside_bytes: int = 0
     beside_frames: int = 0
-
-    @property
-    def script(self) -> str:
-        """The film as a script that hands itself to the page."""
-        return f"sphereFilmArrived({json.dumps(self.values, separators=(',', ':'))});\n"
-
-
-def bare_film(run: str) -> SphereFilm:
-    """A film of no grain, for a view of solids alone."""
-    return SphereFilm(
-        run=run, label="", grains=0, of_grains=0, vertices=0, time_s=(0.0,),
-        vibration_time_s=(None,), stage=("",), is_filling=(False,), reading=(None,),
-        origin_m=(0.0, 0.0, 0.0), quantum_m=1.0, largest_radius_m=1.0, slice_m=None,
-        density_kg_m3=(0.0, 1.0), fastest_m_s=1.0, data=encoded(b""),
-    )  # fmt: skip
 
 
 @dataclass(frozen=True)
@@ -133,10 +120,6 @@ class SphereFrames:
         """All grains at all frames, packed."""
         return self.packed(np.arange(len(self.radius_m)), range(self.place.shape[1]))
 
-    def planned(self, of_grains: int, slice_m: tuple[float, float] | None) -> SphereFilm:
-        """All that was drawn of a scene, perhaps a slice of it only."""
-        return replace(self.whole, of_grains=of_grains, slice_m=slice_m)
-
     def light(self, cut_m: float, budget_bytes: int) -> SphereFilm:
         """Pack what a page can hold: frames are left out, and grains far behind the cut.
 
@@ -158,7 +141,9 @@ class SphereFrames:
         light, total = self.light(cut_m, budget_bytes), self.place.shape[1]
         if light.slice_m is None and len(light.time_s) == total:
             return light, {}
-        name, script = f"{self.film.run}.js", self.whole.script
+        name = f"{self.film.run}.js"
+        # the film as a script that hands itself to the page
+        script = f"sphereFilmArrived({json.dumps(self.whole.values, separators=(',', ':'))});\n"
         href = f"{folder_href}{quote(name)}"
         inside = replace(light, beside=href, beside_bytes=len(script), beside_frames=total)
         return inside, {name: script}
@@ -183,7 +168,7 @@ def sphere_frames(
     scenario: Scenario,
     run: str,
     label: str,
-    scale: DensityScale,
+    scale: tuple[float, float],
     reading: tuple[Array, Array] | None = None,
 ) -> SphereFrames:
     """Quantise and shade all grains of a run.
@@ -232,13 +217,11 @@ def sphere_frames(
         origin_m=tuple(low_m.tolist()),
         quantum_m=quantum_m,
         largest_radius_m=float(radius_m.max(initial=0.0)) or 1.0,
-        slice_m=None,
-        density_kg_m3=(scale.low_kg_m3, scale.high_kg_m3),
+        density_kg_m3=scale,
         fastest_m_s=fastest_m_s,
-        data="",
     )
-    span = (scale.high_kg_m3 - scale.low_kg_m3) or 1.0
-    shares = ((density - scale.low_kg_m3) / span, speed / fastest_m_s)
+    span = (scale[1] - scale[0]) or 1.0
+    shares = ((density - scale[0]) / span, speed / fastest_m_s)
     return SphereFrames(place, radius_m, layer, np.stack([_shade(s) for s in shares]), film)
 
 

@@ -7,7 +7,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from pathlib import Path
 
 import meshio
@@ -47,17 +47,10 @@ _COLUMNS = 4
 _LINE = "0.25"
 
 
-@dataclass(frozen=True)
-class CouplingMap:
-    """The picture, and how many verdicts the prediction gets right."""
-
-    picture: str
-    """A ``data:`` address."""
-    sentence: str
-
-
-def coupling_map(collected: Collected, states: Mapping[str, State]) -> CouplingMap | None:
+def coupling_map(collected: Collected, states: Mapping[str, State]) -> dict[str, str] | None:
     """Draw verdicts and predicted limits, a panel for each setting of the other swept keys.
+
+    The picture's address, and how many verdicts the prediction gets right as a sentence.
 
     ``states``: of the runs that can be judged.
 
@@ -93,7 +86,7 @@ def coupling_map(collected: Collected, states: Mapping[str, State]) -> CouplingM
     for axes in grid[-1]:
         axes.set_xlabel("Young's modulus, Pa")
     figure.legend(handles=_legend(), loc="outside lower center", ncols=5, frameon=False)
-    return CouplingMap(png(figure), _prediction_sentence(rows))
+    return {"picture": png(figure), "sentence": _prediction_sentence(rows)}
 
 
 def _draw(axes: Axes, part: pd.DataFrame) -> None:

@@ -207,7 +207,7 @@ def _shown_runs(
 
 
 def _sphere_films(
-    shown: Sequence[_Shown], scale: figures.DensityScale, budget_bytes: int, folder_href: str
+    shown: Sequence[_Shown], scale: tuple[float, float], budget_bytes: int, folder_href: str
 ) -> tuple[tuple[SphereFilm, ...], dict[str, str]]:
     """Films of spheres for the page, and the scripts beside it."""
     films = []

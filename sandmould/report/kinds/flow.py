@@ -59,7 +59,6 @@ COLOURS = tuple(to_hex(colormaps["viridis"](shade / SHADES)) for shade in range(
 class _PicturedRun:
     """A run that is drawn."""
 
-    run: str
     label: str
     folder: Path
     verdict: str
@@ -94,10 +93,12 @@ def _pages(findings: Findings[MetalFlow], film_budget_bytes: int) -> KindPages:
     measures = [*(f"{name}_pa" for name in ideal_pa), "largest_speed_m_s"]
     stable = stability_map(ranked, keys)
     fields = _fields(pictured, highest_pa)
-    histories = [pressure_history(run.folder, run.label, run.verdict, ideal_pa) for run in pictured]
+    histories = [
+        (it, pressure_history(it.folder, it.label, it.verdict, ideal_pa)) for it in pictured
+    ]
     films = [
         make_flow_film(
-            _load(run.folder), run.run, f"{run.label}: {run.verdict}", highest_pa,
+            _load(run.folder), run.folder.name, f"{run.label}: {run.verdict}", highest_pa,
             film_budget_bytes // len(filmed),
         )
         for run in filmed
@@ -119,9 +120,9 @@ def _pages(findings: Findings[MetalFlow], film_budget_bytes: int) -> KindPages:
         context={"pages": shown},
         figures={
             **pictures(stability_map=stable, fields=fields),
-            **numbered("histories", (history.chart for history in histories)),
+            **numbered("histories", (chart for _, chart in histories)),
         },
-        picture=_first_picture(pictured[:1], highest_pa),
+        picture=_first_picture(pictured[0], highest_pa) if pictured else None,
         answer=next(iter(hopping), "") or _calm(scenario, ranked, keys),
         grounds=notes(
             "flow_grounds.j2",
@@ -137,13 +138,11 @@ def _pages(findings: Findings[MetalFlow], film_budget_bytes: int) -> KindPages:
     )
 
 
-def _first_picture(calmest: Sequence[_PicturedRun], highest_pa: float) -> ReportPicture | None:
-    """The metal at the end of the calmest run; None where no run has left fields."""
-    for run in calmest:
-        alt = f"Particles of run {run.run} at its end, coloured by pressure"
-        caption = f"{run.label}, at its end, coloured by pressure."
-        return ReportPicture(_fields([run], highest_pa), alt, caption)
-    return None
+def _first_picture(run: _PicturedRun, highest_pa: float) -> ReportPicture:
+    """The metal at the end of the calmest run."""
+    alt = f"Particles of run {run.folder.name} at its end, coloured by pressure"
+    caption = f"{run.label}, at its end, coloured by pressure."
+    return ReportPicture(_fields([run], highest_pa), alt, caption)
 
 
 def _ranked(scenario: MetalFlow, summary: pd.DataFrame) -> pd.DataFrame:
@@ -170,7 +169,7 @@ def _pictured_runs(
         folder = study_folder / "runs" / str(row[RUN])
         if (folder / "fields.npz").is_file():
             label = condition_text({key: row[key] for key in keys})
-            drawable.append(_PicturedRun(folder.name, label, folder, str(row[CLASSIFICATION])))
+            drawable.append(_PicturedRun(label, folder, str(row[CLASSIFICATION])))
     return [drawable[place] for place in evenly(len(drawable), PICTURED_RUNS).tolist()]
 
 

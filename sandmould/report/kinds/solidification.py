@@ -15,7 +15,7 @@ import pandas as pd
 from sandmould.definition.sweep import Point
 from sandmould.drawing.chart import PLAIN, Chart, Line, Mark, tints
 from sandmould.drawing.figure_files import numbered, pictures
-from sandmould.drawing.sphere_film import bare_film
+from sandmould.drawing.sphere_film import SphereFilm
 from sandmould.kinds.solidification.kind import SolidificationStudy
 from sandmould.report.cast_fields import cast_fields, cast_scene
 from sandmould.report.curves import curve_figures, measure_curves
@@ -83,7 +83,7 @@ def _pages(findings: Findings[Solidification], film_budget_bytes: int) -> KindPa
     shown = {
         "pictured_run": run,
         "scene": cast_scene(folder, scenario, fed) if fed else None,
-        "films": (bare_film(run),),
+        "films": (SphereFilm(run),),
         "fields": fields,
         "sentences": stand_ins,
         "tables": tables,
