@@ -31,10 +31,16 @@ ABSENT = 65535
 """Coordinate of a grain that has not been filled in yet."""
 
 
+@dataclass(frozen=True, kw_only=True)
 class PackedFilm:
-    """A film whose frames are packed into one text."""
+    """A film of one run whose frames are packed into one text, as the page reads it."""
 
-    data: str
+    run: str
+    label: str = ""
+    time_s: tuple[float, ...] = (0.0,)
+    quantum_m: float = 1.0
+    data: str = ""
+    """Base64 of deflated bytes."""
 
     @property
     def values(self) -> dict[str, object]:
@@ -45,28 +51,31 @@ class PackedFilm:
 FilmT = TypeVar("FilmT", bound=PackedFilm)
 
 
-@dataclass(frozen=True)
-class Film(PackedFilm):
-    """Frames of one run as the page reads them; coordinates are the box's own, in m."""
+@dataclass(frozen=True, kw_only=True)
+class GrainFilm(PackedFilm):
+    """Frames of grains, of none unless given; coordinates are the box's own, in m."""
 
-    run: str
-    label: str
-    grains: int
-    time_s: tuple[float, ...]
-    vibration_time_s: tuple[float | None, ...]
+    grains: int = 0
+    vibration_time_s: tuple[float | None, ...] = (None,)
     """None before the first vibration."""
-    stage: tuple[str, ...]
-    reading: tuple[float | None, ...]
+    stage: tuple[str, ...] = ("",)
+    reading: tuple[float | None, ...] = (None,)
     """The objective at each frame, if known."""
-    origin_m: tuple[float, ...]
-    quantum_m: float
-    largest_radius_m: float
+    origin_m: tuple[float, ...] = (0.0, 0.0, 0.0)
+    largest_radius_m: float = 1.0
+
+
+@dataclass(frozen=True, kw_only=True)
+class Film(GrainFilm):
+    """Discs.
+
+    ``data`` has coordinates by axis, frame and grain; radii (uint16, shares of the largest, low
+    bytes first); layers (uint8).
+    """
+
     bent: tuple[tuple[int, ...], ...]
     """Outline of a pattern at each frame, x and y of one vertex after another in ``BENT_M``; empty
     without one."""
-    data: str
-    """Base64 of deflated bytes: coordinates by axis, frame and grain; radii (uint16, shares of
-    the largest, low bytes first); layers (uint8)."""
 
 
 def make_film(

@@ -55,6 +55,11 @@ def tints(n: int, ordered: bool) -> tuple[Tint, ...]:
     )
 
 
+def thinned(xy: NDArray[np.float64], stride: int) -> NDArray[np.float64]:
+    """Every so many points of a curve, all below two; the last one is kept."""
+    return np.concatenate([xy[: -1 : max(1, stride)], xy[-1:]])
+
+
 LineStyle = Literal["run", "mean", "joined", "behind"]
 """Thin for one run or edge, thick for a mean, dotted between points that it only joins, faint
 behind others."""

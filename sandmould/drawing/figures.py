@@ -9,6 +9,7 @@ import base64
 import io
 import math
 from collections.abc import Callable, Sequence
+from typing import Any
 
 import numpy as np
 from matplotlib import rc_context
@@ -169,19 +170,9 @@ def _dimension(ax: Axes, a: tuple[float, float], b: tuple[float, float], text: s
     """A line with arrows at both ends and its length in mm."""
     style = {"arrowstyle": "<|-|>", "color": _INK, "lw": 0.8, "shrinkA": 0, "shrinkB": 0}
     ax.annotate("", xy=a, xytext=b, arrowprops=style, zorder=6, annotation_clip=False)
-    lying = a[1] == b[1]
-    ax.text(
-        (a[0] + b[0]) / 2,
-        (a[1] + b[1]) / 2,
-        f"{text} mm",
-        rotation=0 if lying else 90,
-        ha="center",
-        va="center",
-        fontsize=11,
-        color=_INK,
-        zorder=7,
-        bbox=_UNDER_TEXT,
-    )
+    middle, rotation = ((a[0] + b[0]) / 2, (a[1] + b[1]) / 2), 0 if a[1] == b[1] else 90
+    centred: dict[str, Any] = {"ha": "center", "va": "center", "fontsize": 11, "color": _INK}
+    ax.text(*middle, f"{text} mm", rotation=rotation, zorder=7, bbox=_UNDER_TEXT, **centred)
 
 
 def draw_layers(
@@ -224,19 +215,11 @@ def draw_densities(
         np.concatenate([f[np.isfinite(f)] for f in density_kg_m3]) if density_kg_m3 else np.zeros(0)
     )
     low, high = (0.0, 1.0) if not len(finite) else np.percentile(finite, [5.0, 98.0]).tolist()
-    value = {id(s): f for s, f in zip(snapshots, density_kg_m3, strict=True)}
-
-    def densities(ax: Axes, snapshot: Snapshot) -> None:
-        draw_grains(
-            snapshot,
-            ax,
-            value[id(snapshot)],
-            cmap="viridis",
-            limits=(low, high),
-            cut_m=cut_m(scenario),
-        )
-
-    pictures = tuple(panel(s, scenario, height_m, densities) for s in snapshots)
+    style: dict[str, Any] = {"cmap": "viridis", "limits": (low, high), "cut_m": cut_m(scenario)}
+    pictures = tuple(
+        panel(s, scenario, height_m, lambda ax, grains, of=f: draw_grains(grains, ax, of, **style))
+        for s, f in zip(snapshots, density_kg_m3, strict=True)
+    )
     medians = tuple(float(np.nanmedian(f)) if len(f) else math.nan for f in density_kg_m3)
     return pictures, (low, high), medians
 

@@ -8,7 +8,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from sandmould.drawing.animation import evenly
-from sandmould.drawing.chart import NARROW, PLAIN, WIDE, Chart, Laid, Line, Range, lay_out
+from sandmould.drawing.chart import NARROW, PLAIN, WIDE, Chart, Laid, Line, Range, lay_out, thinned
 from sandmould.runs.formatting import number
 
 MOST_LINES = 4
@@ -51,7 +51,13 @@ def small_multiples(chart: Chart) -> SmallMultiples | None:
         return SmallMultiples((), (lay_out(bare, WIDE), lay_out(bare, NARROW)), note)
     shown = [means[place] for place in evenly(len(means), MOST_PANELS).tolist()]
     behind = tuple(
-        replace(line, xy=_thinned(line, _POINTS_BEHIND), tint=PLAIN, style="behind", label="")
+        replace(
+            line,
+            xy=thinned(line.xy, len(line.xy) // _POINTS_BEHIND),
+            tint=PLAIN,
+            style="behind",
+            label="",
+        )
         for line in shown
     )
     whole = lay_out(chart, PANEL)
@@ -84,11 +90,6 @@ def _alone(chart: Chart, mean: Line, behind: Sequence[Line], frame: tuple[Range,
     at_end = f"; it ends at {ends[-1, 1]:.4g}" if len(ends) else ""
     alt = f"{chart.y_title} against {chart.x_title}: {mean.title} before all others{at_end}."
     areas = tuple(area for area in chart.areas if area.group == mean.group)
-    front = (replace(line, xy=_thinned(line, _POINTS), label="") for line in own)
+    front = (replace(line, xy=thinned(line.xy, len(line.xy) // _POINTS), label="") for line in own)
     lines = (*behind, *front)
     return replace(chart, x_title="", y_title="", alt=alt, lines=lines, areas=areas, frame=frame)
-
-
-def _thinned(line: Line, most: int) -> np.ndarray:
-    stride = max(1, len(line.xy) // most)
-    return np.concatenate([line.xy[:-1:stride], line.xy[-1:]])

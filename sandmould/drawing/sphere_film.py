@@ -10,6 +10,7 @@ from __future__ import annotations
 import json
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from functools import partial
 from typing import Any
 from urllib.parse import quote
 
@@ -17,17 +18,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from sandmould.analysis.density import apparent_density
-from sandmould.drawing.animation import (
-    ABSENT,
-    PackedFilm,
-    changes,
-    encoded,
-    evenly,
-    readings_at,
-    rounded,
-    split_bytes,
-    within_budget,
-)
+from sandmould.drawing import animation
 from sandmould.engines.snapshot import Snapshot, scene_at
 from sandmould.kinds.sand.moments import Moment
 from sandmould.scenario.scenario import Scenario
@@ -46,40 +37,27 @@ UNKNOWN = 255
 """Shade of a grain whose density is not known."""
 
 
-@dataclass(frozen=True)
-class SphereFilm(PackedFilm):
-    """Frames of one run as the page reads them; coordinates are the box's own, in m.
+@dataclass(frozen=True, kw_only=True)
+class SphereFilm(animation.GrainFilm):
+    """Spheres; of no grain unless given, for a view of solids alone.
 
-    Of no grain unless given, for a view of solids alone.
+    ``data`` has coordinates by axis, frame and point; radii of the grains (uint16, shares of the
+    largest, low bytes first); their layers (uint8); shades of density and of speed by frame and
+    grain (uint8).
     """
 
-    run: str
-    label: str = ""
-    grains: int = 0
     of_grains: int = 0
     """Grains of the run; fewer are shown where the film is light."""
     vertices: int = 0
     """Points after the grains: vertices of the pattern that bends, 0 without one."""
-    time_s: tuple[float, ...] = (0.0,)
-    vibration_time_s: tuple[float | None, ...] = (None,)
-    """None before the first vibration."""
-    stage: tuple[str, ...] = ("",)
     is_filling: tuple[bool, ...] = (False,)
-    reading: tuple[float | None, ...] = (None,)
-    """The objective at each frame, if known."""
-    origin_m: tuple[float, ...] = (0.0, 0.0, 0.0)
-    quantum_m: float = 1.0
-    largest_radius_m: float = 1.0
     slice_m: tuple[float, float] | None = None
     """Least and greatest y of the grains that are shown, where not all are."""
     density_kg_m3: tuple[float, float] = (0.0, 1.0)
     """Densities of shades 0 and 254."""
     fastest_m_s: float = 1.0
     """Speed of shade 254 and above."""
-    data: str = encoded(b"")
-    """Base64 of deflated bytes: coordinates by axis, frame and point; radii of the grains (uint16,
-    shares of the largest, low bytes first); their layers (uint8); shades of density and of speed
-    by frame and grain (uint8)."""
+    data: str = animation.encoded(b"")
     beside: str = ""
     """Address of the script with all grains and frames; empty where this film has them."""
     beside_bytes: int = 0
@@ -104,8 +82,8 @@ class SphereFrames:
         points = np.append(grains, np.arange(len(self.radius_m), self.place.shape[2]))
         share = np.rint(self.radius_m[grains] / self.film.largest_radius_m * 65535)
         raw = (
-            split_bytes(changes(self.place[:, frames][:, :, points]))
-            + split_bytes(share.astype(np.uint16))
+            animation.split_bytes(animation.changes(self.place[:, frames][:, :, points]))
+            + animation.split_bytes(share.astype(np.uint16))
             + self.layer[grains].tobytes()
             + self.shade[:, frames][:, :, grains].tobytes()
         )
@@ -113,7 +91,7 @@ class SphereFrames:
         chosen: dict[str, Any] = {
             name: tuple(getattr(self.film, name)[i] for i in frames) for name in of_frames
         }
-        return replace(self.film, **chosen, grains=len(grains), data=encoded(raw))
+        return replace(self.film, **chosen, grains=len(grains), data=animation.encoded(raw))
 
     @property
     def whole(self) -> SphereFilm:
@@ -128,7 +106,7 @@ class SphereFrames:
         grains, slice_m = self._behind(cut_m)
         total = self.place.shape[1]
         count = max(2, min(total, budget_bytes // max(1, 4 * len(grains))))
-        film = within_budget(lambda frames: self.packed(grains, frames), total, count, budget_bytes)
+        film = animation.within_budget(partial(self.packed, grains), total, count, budget_bytes)
         return replace(film, slice_m=slice_m)
 
     def inside_and_beside(
@@ -154,12 +132,12 @@ class SphereFrames:
         if n <= MOST_INSIDE:
             return np.arange(n), None
         y = self.film.origin_m[1] + self.film.quantum_m * self.place[1, -1, :n]
-        nearest = np.where(self.place[1, -1, :n] == ABSENT, -np.inf, y) + self.radius_m
+        nearest = np.where(self.place[1, -1, :n] == animation.ABSENT, -np.inf, y) + self.radius_m
         # as many as the page holds from the plane on; some before it where it lies far back
         order = np.argsort(nearest, kind="stable")
         first = min(int(np.searchsorted(nearest[order], cut_m)), n - MOST_INSIDE)
         chosen = np.sort(order[first : first + MOST_INSIDE])
-        here = self.place[1, -1, chosen] != ABSENT
+        here = self.place[1, -1, chosen] != animation.ABSENT
         return chosen, (float(y[chosen][here].min()), float(y[chosen][here].max()))
 
 
@@ -177,11 +155,11 @@ def sphere_frames(
     moments are read one at a time.
     """
     most = max(2, min(MOST_FRAMES, MOST_BESIDE // max(1, len(_read(snapshots[-1]).id))))
-    chosen = [snapshots[i] for i in evenly(len(snapshots), most).tolist()]
+    chosen = [snapshots[i] for i in animation.evenly(len(snapshots), most).tolist()]
     ids, low_m, high_m, vertices = _extent(chosen)
     quantum_m = float((high_m - low_m).max()) / LEVELS or 1e-6
     n, total = len(ids), len(chosen)
-    place = np.full((3, total, n + vertices), ABSENT, dtype=np.uint16)
+    place = np.full((3, total, n + vertices), animation.ABSENT, dtype=np.uint16)
     density, speed = np.full((total, n), np.nan), np.zeros((total, n))
     radius_m, layer = np.zeros(n), np.zeros(n, dtype=np.uint8)
     clock: list[tuple[float, float, str]] = []
@@ -202,7 +180,7 @@ def sphere_frames(
         clock.append((frame.time_s, frame.vibration_time_s, frame.stage))
     time_s = np.array([time for time, _, _ in clock])
     filling = tuple(is_filling(stage) for _, _, stage in clock)
-    fastest_m_s = _fastest(speed, place[0, :, :n] != ABSENT, np.array(filling))
+    fastest_m_s = _fastest(speed, place[0, :, :n] != animation.ABSENT, np.array(filling))
     film = SphereFilm(
         run=run,
         label=label,
@@ -210,10 +188,10 @@ def sphere_frames(
         of_grains=n,
         vertices=vertices,
         time_s=tuple(time_s.round(6).tolist()),
-        vibration_time_s=rounded(shaken_s for _, shaken_s, _ in clock),
+        vibration_time_s=animation.rounded(shaken_s for _, shaken_s, _ in clock),
         stage=tuple(stage for _, _, stage in clock),
         is_filling=filling,
-        reading=readings_at(time_s, reading),
+        reading=animation.readings_at(time_s, reading),
         origin_m=tuple(low_m.tolist()),
         quantum_m=quantum_m,
         largest_radius_m=float(radius_m.max(initial=0.0)) or 1.0,

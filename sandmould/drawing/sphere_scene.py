@@ -78,7 +78,11 @@ def sphere_scene(
         }
         for solid in scenario.scene.solids
     ]
-    bores = [np.round(lines_m, 6).ravel().tolist() for lines_m in _cavity_lines(scenario)]
+    lines = [_bore_lines(bore) for bore in scenario.scene.bores]
+    for cavity in scenario.scene.cavities:
+        vertices_m, triangles = _triangles(cavity.space)
+        lines.append(vertices_m[sharp_edges(vertices_m, triangles)])
+    bores = [np.round(lines_m, 6).ravel().tolist() for lines_m in lines]
     return _scene((box.width_m, box.depth_m, top_m), cut_m(scenario), solids, bores, fields)
 
 
@@ -193,16 +197,6 @@ def sharp_edges(vertices_m: Array, triangles: NDArray[np.int64]) -> NDArray[np.i
     flat = mesh.face_adjacency_edges[mesh.face_adjacency_angles < _SHARP_RAD]
     edges = trimesh.grouping.boolean_rows(mesh.edges_unique, flat, np.setdiff1d)
     return np.asarray(edges, dtype=np.int64)
-
-
-def _cavity_lines(scenario: Scenario) -> list[Array]:
-    """Ends of the lines along the edges of each tube's bore and of each cavity."""
-    scene = scenario.scene
-    lines = [_bore_lines(bore) for bore in scene.bores]
-    for cavity in scene.cavities:
-        vertices_m, triangles = _triangles(cavity.space)
-        lines.append(vertices_m[sharp_edges(vertices_m, triangles)])
-    return lines
 
 
 def _bore_lines(bore: Bore) -> Array:

@@ -93,23 +93,15 @@ def _table(compared: Sequence[Compared]) -> Table:
 def _chart(compared: Sequence[Compared]) -> Chart:
     """Intervals of one measure in rows, with the margins shaded."""
     margin = compared[0].agreement.margin
-    marks = [
-        Mark(
-            c.agreement.difference,
-            row,
-            "mean",
-            _TINTS.get(c.agreement.verdict, PLAIN),
-            (c.agreement.ci[1] - c.agreement.ci[0]) / 2,
-            f"{c.pair}: {number(c.agreement.difference, 2)}, {c.agreement.verdict}",
-        )
-        for row, c in enumerate(compared)
-        if math.isfinite(c.agreement.difference)
-    ]
-    said = [
-        f"{c.pair}{f' at {c.at}' if c.at else ''}: {number(c.agreement.difference, 2)}, "
-        f"{interval_text(c.agreement)}, {c.agreement.verdict}"
-        for c in compared
-    ]
+    marks, said = [], []
+    for row, c in enumerate(compared):
+        of, apart = c.agreement, number(c.agreement.difference, 2)
+        where = f"{c.pair}{f' at {c.at}' if c.at else ''}"
+        said.append(f"{where}: {apart}, {interval_text(of)}, {of.verdict}")
+        if math.isfinite(of.difference):
+            tint, reach = _TINTS.get(of.verdict, PLAIN), (of.ci[1] - of.ci[0]) / 2
+            title = f"{c.pair}: {apart}, {of.verdict}"
+            marks.append(Mark(of.difference, row, "mean", tint, reach, title))
     what = titled(compared[0].measure)
     return Chart(
         f"difference in {what}",

@@ -28,7 +28,6 @@ from sandmould.statistics.answer import Answer
 from sandmould.statistics.config import FULL_SHARE
 from sandmould.statistics.evidence import usable_values
 from sandmould.statistics.optimum import Optimum
-from sandmould.statistics.settings import Setting
 from sandmould.statistics.verdict import Verdict
 from sandmould.wording.answer import OF_DRIVE, AnswerWords, place_text
 from sandmould.wording.next_steps import NextSteps
@@ -107,7 +106,21 @@ def figures_of(answer: Answer, summary: pd.DataFrame) -> tuple[KeyNumber, ...]:
     """The one setting that suits the question in words of the machine; nothing where several do."""
     if len(answer.wanted) != 1 or answer.beside:
         return ()
-    return _figures(answer.verdict.setting(answer.wanted[0]), answer, summary)
+    verdict, setting = answer.verdict, answer.verdict.setting(answer.wanted[0])
+    drive = answer.drives.get(setting.label)
+    figures = [] if drive is None else [KeyNumber(f"{number(drive.frequency_hz)} Hz", "frequency")]
+    figures += _motion_figures(drive)
+    figures += [
+        KeyNumber(value_text(key, value), name_of(key))
+        for key, value in setting.values.items()
+        if drive is None or key.rpartition(".")[2] not in OF_DRIVE
+    ]
+    share = share_of_what_fits(summary, verdict.measure, setting.values)
+    runs = f"mean of {setting.n} runs, ± its 95 % interval" if setting.n > 1 else "one run"
+    mean = AnswerWords(answer).value(setting.mean, setting.ci_half_width)
+    if math.isfinite(share):
+        figures.append(_share_figure(share, verdict.measure, "of what fits in"))
+    return (*figures, KeyNumber(mean, name_of(verdict.measure), runs))
 
 
 def table_of(answer: Answer) -> Table | None:
@@ -173,24 +186,6 @@ def _share_figure(share: float, measure: str, label: str) -> KeyNumber:
     space = filled_space(measure).replace("_", " ")
     note = f"100 %: the sand in the {space} is as dense as that outside"
     return KeyNumber(f"{100 * share:.0f} %", label, note)
-
-
-def _figures(setting: Setting, answer: Answer, summary: pd.DataFrame) -> tuple[KeyNumber, ...]:
-    """What is set, how the box then moves, and what comes of it."""
-    verdict, drive = answer.verdict, answer.drives.get(setting.label)
-    figures = [] if drive is None else [KeyNumber(f"{number(drive.frequency_hz)} Hz", "frequency")]
-    figures += _motion_figures(drive)
-    figures += [
-        KeyNumber(value_text(key, value), name_of(key))
-        for key, value in setting.values.items()
-        if drive is None or key.rpartition(".")[2] not in OF_DRIVE
-    ]
-    share = share_of_what_fits(summary, verdict.measure, setting.values)
-    runs = f"mean of {setting.n} runs, ± its 95 % interval" if setting.n > 1 else "one run"
-    mean = AnswerWords(answer).value(setting.mean, setting.ci_half_width)
-    if math.isfinite(share):
-        figures.append(_share_figure(share, verdict.measure, "of what fits in"))
-    return (*figures, KeyNumber(mean, name_of(verdict.measure), runs))
 
 
 def _motion_figures(drive: BoxDrive | None) -> list[KeyNumber]:

@@ -22,9 +22,9 @@ from sandmould.pattern_fe.quality import mesh_sentence
 from sandmould.pattern_fe.scene import pattern_of
 from sandmould.report.bending_figures import coupling_map, draw_distances, draw_outlines
 from sandmould.report.curves import runs_by_setting, setting_tints, time_chart
-from sandmould.report.tables import Cell, Column, Table
+from sandmould.report.tables import Cell, Column, Table, number_cell
 from sandmould.runs.columns import RUN, SOLID_FRACTION, TIME_S, VIBRATION_TIME_S
-from sandmould.runs.formatting import number, setting_text
+from sandmould.runs.formatting import setting_text
 from sandmould.runs.templates import sentences
 from sandmould.scenario.pattern import PatternDrawing
 from sandmould.scenario.scenario import Scenario
@@ -255,7 +255,10 @@ def _runs_table(
                 Cell(run, run),
                 *([Cell(setting, setting)] if collected.keys else []),
                 _loop_cell(loop_verdict),
-                *(_value_cell(measures.get(name), factor) for _, name, factor, _ in _COLUMNS),
+                *(
+                    number_cell(factor * float(measures.get(name, math.nan)))
+                    for _, name, factor, _ in _COLUMNS
+                ),
                 *(_file_cell(study_folder, href, run, suffix) for suffix in ("vtu", "stl")),
             )
         )
@@ -268,11 +271,6 @@ def _loop_cell(verdict: LoopVerdict | None) -> Cell:
         return Cell("–", "")
     reason = verdict.sentence.split(": ", 1)[1]
     return Cell(verdict.state, verdict.state, note=reason[0].upper() + reason[1:])
-
-
-def _value_cell(value: Any, factor: float) -> Cell:
-    x = math.nan if value is None else factor * float(value)
-    return Cell(number(x), str(x))
 
 
 def _file_cell(study_folder: Path, href: str, run: str, suffix: str) -> Cell:

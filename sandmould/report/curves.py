@@ -15,7 +15,7 @@ import pandas as pd
 from numpy.typing import NDArray
 
 from sandmould.definition.study import Study
-from sandmould.drawing.chart import PLAIN, Chart, Line, Mark, Tint, tints
+from sandmould.drawing.chart import PLAIN, Chart, Line, Mark, Tint, thinned, tints
 from sandmould.drawing.figure_files import numbered
 from sandmould.drawing.thinning import drawn_part
 from sandmould.kinds.sand.moments import list_moments
@@ -121,7 +121,7 @@ def time_chart(
         least = factor * float(usable_values(summary, measure).min())
         xy_all[:, 1] = np.maximum(xy_all[:, 1], _SHOWN_BELOW * least)
     by_run = {str(run): xy_all[rows] for run, rows in charted.groupby(RUN).indices.items()}
-    stride = max(1, len(charted) // _POINTS)
+    stride = len(charted) // _POINTS
     colour = setting_tints(verdict, keys)
     labelled = _labelled(verdict)
     lines: list[Line] = []
@@ -137,21 +137,15 @@ def time_chart(
                 continue
             xy = by_run[str(run)]
             ended = f", {why_unused(why) or outcome}" if why else ""
-            lines.append(
-                Line(
-                    _thinned(xy, stride),
-                    tint,
-                    title=f"{run}: {setting.label}{ended}",
-                    group=setting.label,
-                )
-            )
+            title = f"{run}: {setting.label}{ended}"
+            lines.append(Line(thinned(xy, stride), tint, title=title, group=setting.label))
             if not why:
                 complete.append(xy[np.isfinite(xy).all(axis=1)])
         mean = _mean_curve(complete)
         if mean is not None:
             label = setting.label if setting.label in labelled else ""
             title = f"{setting.label}, mean of {len(complete)}"
-            means.append(Line(_thinned(mean, stride), tint, "mean", label, title, setting.label))
+            means.append(Line(thinned(mean, stride), tint, "mean", label, title, setting.label))
     when = "time of vibration, s" if clock == VIBRATION_TIME_S else "time, s"
     return Chart(when, what, _alt(what, when, means), tuple(lines + means), log_y=log_y)
 
@@ -185,11 +179,6 @@ def _labelled(verdict: Verdict) -> set[str]:
         return {s.label for s in verdict.settings}
     chosen = [verdict.settings[0], verdict.settings[-1], verdict.best, verdict.runner_up]
     return {s.label for s in chosen if s is not None}
-
-
-def _thinned(xy: NDArray[np.float64], stride: int) -> NDArray[np.float64]:
-    """Every so many points, the last one kept."""
-    return np.concatenate([xy[:-1:stride], xy[-1:]])
 
 
 def _mean_curve(curves: Sequence[NDArray[np.float64]]) -> NDArray[np.float64] | None:
@@ -231,28 +220,18 @@ def objective_charts(
         return (_row_chart(summary, verdict),)
     values = usable_values(summary, verdict.measure)
     factor, what = display_scale(verdict.measure)
-    numeric = [k for k in keys if pd.api.types.is_numeric_dtype(summary[k])]
-    return tuple(
-        Chart(
-            titled(key),
-            what,
-            f"{name_of(verdict.measure)} of every run against {titled(key)}.",
-            marks=tuple(
-                Mark(
-                    float(x),
-                    factor * float(y),
-                    "run",
-                    tints(1, False)[0],
-                    title=f"{run}: {number(y)}",
-                )
-                for run, x, y in zip(summary[RUN], summary[key], values, strict=True)
-                if math.isfinite(y)
-            ),
-            log_x=spans(summary[key], WIDE_KEY),
-            log_y=verdict.is_wide,
+    (tint,), charts = tints(1, False), []
+    for key in (k for k in keys if pd.api.types.is_numeric_dtype(summary[k])):
+        alt = f"{name_of(verdict.measure)} of every run against {titled(key)}."
+        marks = tuple(
+            Mark(float(x), factor * float(y), "run", tint, title=f"{run}: {number(y)}")
+            for run, x, y in zip(summary[RUN], summary[key], values, strict=True)
+            if math.isfinite(y)
         )
-        for key in numeric
-    )
+        log_x = spans(summary[key], WIDE_KEY)
+        chart = Chart(titled(key), what, alt, marks=marks, log_x=log_x, log_y=verdict.is_wide)
+        charts.append(chart)
+    return tuple(charts)
 
 
 def _scale_chart(summary: pd.DataFrame, verdict: Verdict, key: str) -> Chart:

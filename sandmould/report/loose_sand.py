@@ -35,12 +35,7 @@ def loose_sand_pages(
     if not run or not scenario.scene.solids or scenario.gate is not None:
         return None
     from sandmould.analysis.loose_zones import BALL_GRAINS, LOOSE, find_loose_sand
-    from sandmould.drawing.loose_field import (  # scipy: few need it
-        LEAST,
-        MOST,
-        draw_loose_field,
-        on_surfaces,
-    )
+    from sandmould.drawing import loose_field
 
     moments = list_moments(folder / "runs" / run)
     if not moments:
@@ -71,9 +66,9 @@ def loose_sand_pages(
     )
     return {
         "sentences": said,
-        "picture": draw_loose_field(loose.field, numbers, last, scenario, height_m),
-        "surface": on_surfaces(loose.field) if scenario.dimension == 3 else None,
-        "ends": (LEAST, MOST),
+        "picture": loose_field.draw_loose_field(loose.field, numbers, last, scenario, height_m),
+        "surface": loose_field.on_surfaces(loose.field) if scenario.dimension == 3 else None,
+        "ends": (loose_field.LEAST, loose_field.MOST),
         "loose": LOOSE,
         "reach_mm": 1e3 * 0.5 * BALL_GRAINS * grain_m,
         "table": _table([loose.zones[place - 1] for place in numbers], scenario),

@@ -20,7 +20,7 @@ from sandmould.kinds.sand.moments import list_moments
 from sandmould.kinds.sand.outflow import slopes
 from sandmould.report.tables import ReportPicture
 from sandmould.runs.columns import RUN
-from sandmould.runs.formatting import name_of, number, unit_of
+from sandmould.runs.formatting import number, titled
 from sandmould.scenario.scenario import Scenario
 from sandmould.statistics.calibration.posterior import axes_of, surface
 from sandmould.statistics.calibration.sands import CalibratedSand
@@ -46,8 +46,7 @@ def axis_title(key: str) -> str:
         return "rolling angle α, °"
     if key.endswith("grain_grain.friction"):
         return "sliding friction μ between grains"
-    unit = unit_of(key)
-    return f"{name_of(key)}, {unit}" if unit else name_of(key)
+    return titled(key)
 
 
 def draw_heap(snapshot: Snapshot, scenario: Scenario, height_m: float) -> str:

@@ -133,16 +133,10 @@ def _responses(study_folder: Path, runs: Sequence[str]) -> list[Response]:
             rows = total[total[STAGE] == StageKind.VIBRATE.numbered(place)]
             if len(rows) < 4:
                 continue
-            shaken.append(stage.frequency_hz)
-            response.append(
-                transfer(
-                    rows[TIME_S].to_numpy(dtype=np.float64),
-                    rows[upward].to_numpy(dtype=np.float64),
-                    stage.frequency_hz,
-                    window_s,
-                    rigid_n,
-                )
-            )
+            frequency_hz = stage.frequency_hz
+            time_s, force_n = (rows[c].to_numpy(dtype=np.float64) for c in (TIME_S, upward))
+            shaken.append(frequency_hz)
+            response.append(transfer(time_s, force_n, frequency_hz, window_s, rigid_n))
         responses.append((np.array(shaken), np.array(response)))
     return responses
 

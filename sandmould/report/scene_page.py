@@ -159,7 +159,7 @@ def _of_casting(scenario: Solidification, run: str) -> tuple[Figure, dict[str, A
         ),
         "slice_note": "",
         "vibrates": False,
-        "films": (SphereFilm(run),),
+        "films": (SphereFilm(run=run),),
         "scene": solid_scene(solids, low_m, high_m) if scenario.dimensions == 3 else {},
         "layer_colours": [],
     }

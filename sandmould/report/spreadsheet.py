@@ -80,16 +80,10 @@ def write_spreadsheet(study_folder: Path, out: Path) -> None:
         book.save(partial)
 
 
-def _conversion(key: str) -> tuple[float, float]:
-    """Factor and offset from the tables to what is shown."""
-    _, factor, offset = _SHOWN.get(unit_of(key), ("", 1.0, 0.0))
-    return factor, offset
-
-
 def _shown(key: str, value: Any) -> Any:
     if not is_number(value):
         return value
-    factor, offset = _conversion(key)
+    _, factor, offset = _SHOWN.get(unit_of(key), ("", 1.0, 0.0))
     return factor * value + offset
 
 

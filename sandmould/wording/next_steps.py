@@ -220,11 +220,6 @@ def optimum_steps(
     return steps
 
 
-def agreement_steps(is_sound: bool) -> list[NextStep]:
-    """What a comparison of settings that should agree asks for."""
-    return [step("take_cheapest" if is_sound else "differ")]
-
-
 def certificate_steps(study: Study, answer: Answer) -> list[NextStep]:
     """The controls of a best frequency, where none were asked for."""
     is_best = answer.best is not None and study.seeks_best

@@ -33,17 +33,12 @@ from sandmould.drawing.animation import evenly
 from sandmould.drawing.figure_files import numbered, pictures
 from sandmould.drawing.figures import png
 from sandmould.drawing.flow_film import SHADES, make_flow_film
+from sandmould.report import flow_charts
 from sandmould.report.curves import measure_curves
-from sandmould.report.flow_charts import (
-    condition_text,
-    pressure_history,
-    said_of,
-    stability_map,
-)
 from sandmould.report.kinds.kind import Findings, KindPages, KindReport
-from sandmould.report.tables import Cell, Column, ReportPicture, Table
+from sandmould.report.tables import Cell, Column, ReportPicture, Table, number_cell
 from sandmould.runs.columns import CLASSIFICATION, DETAIL, HOPS, OUTCOME_CODE, RUN
-from sandmould.runs.formatting import name_of, number, setting_text
+from sandmould.runs.formatting import name_of, setting_text
 from sandmould.runs.templates import Note, notes, sentences, worded
 from sandmould.scenario.casting.flow import MetalFlow, PouredMetal, StillTank
 from sandmould.study.collect import Collected
@@ -91,10 +86,11 @@ def _pages(findings: Findings[MetalFlow], film_budget_bytes: int) -> KindPages:
     filmed = [pictured[0], pictured[-1]][: min(FILMED, len(pictured))] if pictured else []
     hopping = _hopping(scenario, ranked, keys)
     measures = [*(f"{name}_pa" for name in ideal_pa), "largest_speed_m_s"]
-    stable = stability_map(ranked, keys)
+    stable = flow_charts.stability_map(ranked, keys)
     fields = _fields(pictured, highest_pa)
     histories = [
-        (it, pressure_history(it.folder, it.label, it.verdict, ideal_pa)) for it in pictured
+        (it, flow_charts.pressure_history(it.folder, it.label, it.verdict, ideal_pa))
+        for it in pictured
     ]
     films = [
         make_flow_film(
@@ -168,7 +164,7 @@ def _pictured_runs(
     for _, row in ranked.iterrows():
         folder = study_folder / "runs" / str(row[RUN])
         if (folder / "fields.npz").is_file():
-            label = condition_text({key: row[key] for key in keys})
+            label = flow_charts.condition_text({key: row[key] for key in keys})
             drawable.append(_PicturedRun(label, folder, str(row[CLASSIFICATION])))
     return [drawable[place] for place in evenly(len(drawable), PICTURED_RUNS).tolist()]
 
@@ -233,7 +229,7 @@ def _hopping(scenario: MetalFlow, ranked: pd.DataFrame, keys: Sequence[str]) -> 
     ended = ranked[ranked[CLASSIFICATION] != StabilityRating.FAILED.value]
     at = {
         hops: [
-            condition_text({key: row[key] for key in keys})
+            flow_charts.condition_text({key: row[key] for key in keys})
             for _, row in ended[ended[HOPS] == hops].iterrows()
         ]
         for hops in (0, 1)
@@ -247,33 +243,27 @@ def _noise(scenario: MetalFlow, ranked: pd.DataFrame, keys: Sequence[str]) -> Ta
     deepest = scene.deepest(scenario)
     is_papers = scenario.case == StillTank() and scenario.metal == PouredMetal()
     said = [
-        said_of({key: row[key] for key in keys}) if is_papers else ""
+        flow_charts.said_of({key: row[key] for key in keys}) if is_papers else ""
         for _, row in ranked.iterrows()
     ]
-    columns = [Column("setting", False), Column("verdict", False)]
-    value_columns: list[tuple[str, int]] = []
+    measured = []
     for name in names:
-        columns += [Column(f"{name}: mean, Pa"), Column(f"{name}: deviation, Pa")]
-        value_columns += [(f"{name}_mean_pa", 4), (f"{name}_sd_pa", 3)]
+        measured.append((f"{name}: mean, Pa", f"{name}_mean_pa", 4))
+        measured.append((f"{name}: deviation, Pa", f"{name}_sd_pa", 3))
     window = f"{name_of(deepest)}: deviation of {1e3 * NOISE_WINDOW_S:g} ms means, Pa"
-    columns += [Column(window), Column("fastest, m/s"), Column("mean speed, m/s")]
-    value_columns += [
-        (f"{deepest}_window_sd_pa", 3),
-        ("peak_speed_m_s", 2),
-        ("average_speed_m_s", 2),
-    ]
+    measured.append((window, f"{deepest}_window_sd_pa", 3))
+    measured.append(("fastest, m/s", "peak_speed_m_s", 2))
+    measured.append(("mean speed, m/s", "average_speed_m_s", 2))
+    columns = [Column("setting", False), Column("verdict", False)]
+    columns += [Column(title) for title, _, _ in measured]
     if any(said):
         columns.append(Column("paper's text", False))
     rows = []
     for (_, row), text in zip(ranked.iterrows(), said, strict=True):
-        label = condition_text({key: row[key] for key in keys})
+        label = flow_charts.condition_text({key: row[key] for key in keys})
         note = str(row[DETAIL]) if str(row[DETAIL]) != "nan" else ""
         cells = [Cell(label, label), Cell(str(row[CLASSIFICATION]), str(row["rank"]), note=note)]
-        values = [float(row.get(column, np.nan)) for column, _ in value_columns]
-        cells += [
-            Cell(number(value, digits), str(value))
-            for value, (_, digits) in zip(values, value_columns, strict=True)
-        ]
+        cells += [number_cell(float(row.get(of, np.nan)), digits) for _, of, digits in measured]
         rows.append((*cells, Cell(text, text)) if any(said) else tuple(cells))
     failed = tuple(c == StabilityRating.FAILED.value for c in ranked[CLASSIFICATION])
     return Table(tuple(columns), tuple(rows), failed)

@@ -73,11 +73,6 @@ class Findings(Generic[ScenarioT]):
     notes: tuple[str, ...]
     """What the simulation leaves open."""
 
-    @property
-    def scenarios(self) -> Mapping[str, ScenarioT]:
-        """A scenario of each of these settings, by its label."""
-        return {label: scenario for label, (scenario, _) in self.by_setting.items()}
-
 
 @dataclass(frozen=True)
 class KindReport:

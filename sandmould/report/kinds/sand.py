@@ -70,6 +70,7 @@ def _pages(findings: Findings[Scenario], film_budget_bytes: int) -> KindPages:
     surfaces = [loose["surface"]] if loose and loose["surface"] else []
     best = verdict.best.label if verdict.best else ""
     grain_size = grain_size_pages(study, collected, scenario, best) if verdict.best else None
+    by_setting = {label: own for label, (own, _) in findings.by_setting.items()}
     pages["film_scene"] = film_scene(scenario, pages["height_m"], surfaces)
     return KindPages(
         "sand.html",
@@ -92,7 +93,7 @@ def _pages(findings: Findings[Scenario], film_budget_bytes: int) -> KindPages:
         _first_picture(pages, verdict, of_sweep),
         pages["beside"],
         grounds=sand_grounds(
-            scenario, study, verdict, findings.scenarios, grain_size.short if grain_size else ()
+            scenario, study, verdict, by_setting, grain_size.short if grain_size else ()
         ),
         at_last=None if grain_size else coarse_step(study, scenario.sand.size_scale),
         steps=tuple(narrow_steps(study, findings.answer, narrow_spaces(scenario))),

@@ -83,7 +83,7 @@ def _pages(findings: Findings[Solidification], film_budget_bytes: int) -> KindPa
     shown = {
         "pictured_run": run,
         "scene": cast_scene(folder, scenario, fed) if fed else None,
-        "films": (SphereFilm(run),),
+        "films": (SphereFilm(run=run),),
         "fields": fields,
         "sentences": stand_ins,
         "tables": tables,
@@ -210,16 +210,8 @@ def _cooling(run: str, curves: pd.DataFrame, scenario: Solidification) -> Chart 
         for of, own in curves.groupby(RUN):
             xy = own[[TIME_S, f"{name}_k"]].to_numpy(dtype=np.float64) - [0.0, ZERO_K]
             xy = xy[:: max(1, len(xy) // MOST_POINTS)]
-            own_line = of == run
-            lines.append(
-                Line(
-                    xy,
-                    tint,
-                    "mean" if own_line else "behind",
-                    name if own_line else "",
-                    f"{name}, {of}",
-                )
-            )
+            style, label = ("mean", name) if of == run else ("behind", "")
+            lines.append(Line(xy, tint, style, label, f"{name}, {of}"))
     end_s = float(curves[TIME_S].max())
     for what in ("liquidus", "solidus"):
         at = getattr(scenario.casting, f"{what}_k") - ZERO_K
