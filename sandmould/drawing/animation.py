@@ -18,7 +18,6 @@ from typing import TypeVar
 import numpy as np
 from numpy.typing import NDArray
 
-from sandmould.engines.snapshot import Snapshot
 from sandmould.kinds.sand.moments import Moment, list_moments
 
 BUDGET_BYTES = 2_500_000
@@ -159,14 +158,13 @@ def _pack(
         origin_m=tuple(origin_m.tolist()),
         quantum_m=quantum_m,
         largest_radius_m=largest_m,
-        bent=tuple(_outline(f) for f in frames if f.pattern_m is not None),
+        bent=tuple(
+            tuple(np.rint(f.pattern_m / BENT_M).astype(np.int64).ravel().tolist())
+            for f in frames
+            if f.pattern_m is not None
+        ),
         data=encoded(raw),
     )
-
-
-def _outline(frame: Snapshot) -> tuple[int, ...]:
-    assert frame.pattern_m is not None
-    return tuple(np.rint(frame.pattern_m / BENT_M).astype(np.int64).ravel().tolist())
 
 
 def changes(place: NDArray[np.uint16]) -> NDArray[np.uint16]:

@@ -353,16 +353,11 @@ def _laid_lines(lines: Sequence[Line], x: Axis, y: Axis) -> tuple[LaidLine, ...]
         laid.append((line, path, pixels[-1]))
     labelled = [(i, end[1]) for i, (line, _, end) in enumerate(laid) if line.label]
     heights = dict(_spread(labelled, y.end, y.start))
-    return tuple(
-        LaidLine(
-            line,
-            path,
-            end,
-            (x.end if line.style == "mean" else end[0]) + _BESIDE,
-            heights.get(i, end[1]),
-        )
-        for i, (line, path, end) in enumerate(laid)
-    )
+    placed = []
+    for i, (line, path, end) in enumerate(laid):
+        label_x = (x.end if line.style == "mean" else end[0]) + _BESIDE
+        placed.append(LaidLine(line, path, end, label_x, heights.get(i, end[1])))
+    return tuple(placed)
 
 
 def _spread(

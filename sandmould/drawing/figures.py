@@ -216,10 +216,12 @@ def draw_densities(
     )
     low, high = (0.0, 1.0) if not len(finite) else np.percentile(finite, [5.0, 98.0]).tolist()
     style: dict[str, Any] = {"cmap": "viridis", "limits": (low, high), "cut_m": cut_m(scenario)}
-    pictures = tuple(
-        panel(s, scenario, height_m, lambda ax, grains, of=f: draw_grains(grains, ax, of, **style))
-        for s, f in zip(snapshots, density_kg_m3, strict=True)
-    )
+    value = {id(s): f for s, f in zip(snapshots, density_kg_m3, strict=True)}
+
+    def densities(ax: Axes, snapshot: Snapshot) -> None:
+        draw_grains(snapshot, ax, value[id(snapshot)], **style)
+
+    pictures = tuple(panel(s, scenario, height_m, densities) for s in snapshots)
     medians = tuple(float(np.nanmedian(f)) if len(f) else math.nan for f in density_kg_m3)
     return pictures, (low, high), medians
 

@@ -50,16 +50,8 @@ def small_multiples(chart: Chart) -> SmallMultiples | None:
         )
         return SmallMultiples((), (lay_out(bare, WIDE), lay_out(bare, NARROW)), note)
     shown = [means[place] for place in evenly(len(means), MOST_PANELS).tolist()]
-    behind = tuple(
-        replace(
-            line,
-            xy=thinned(line.xy, len(line.xy) // _POINTS_BEHIND),
-            tint=PLAIN,
-            style="behind",
-            label="",
-        )
-        for line in shown
-    )
+    few = ((line, thinned(line.xy, len(line.xy) // _POINTS_BEHIND)) for line in shown)
+    behind = tuple(replace(line, xy=xy, tint=PLAIN, style="behind", label="") for line, xy in few)
     whole = lay_out(chart, PANEL)
     frame = (whole.x.low, whole.x.high), (whole.y.low, whole.y.high)
     panels = tuple(

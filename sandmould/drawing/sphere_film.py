@@ -167,8 +167,8 @@ def sphere_frames(
         frame = _read(each)
         row = np.searchsorted(ids, frame.id)
         place[:, number, row] = np.rint((frame.position_m - low_m) / quantum_m).T
-        if vertices:
-            place[:, number, n:] = np.rint((_bent(frame) - low_m) / quantum_m).T
+        if vertices and frame.pattern_m is not None:
+            place[:, number, n:] = np.rint((frame.pattern_m - low_m) / quantum_m).T
         radius_m[row], layer[row] = frame.radius_m, np.minimum(frame.layer, 255)
         speed[number, row] = np.linalg.norm(frame.velocity_m_s, axis=1)
         density[number, row] = apparent_density(
@@ -205,11 +205,6 @@ def sphere_frames(
 
 def _read(snapshot: Snapshot | Moment) -> Snapshot:
     return snapshot.load() if isinstance(snapshot, Moment) else snapshot
-
-
-def _bent(frame: Snapshot) -> Array:
-    assert frame.pattern_m is not None
-    return frame.pattern_m
 
 
 def _extent(

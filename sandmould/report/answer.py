@@ -3,14 +3,16 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
+import numpy as np
 import pandas as pd
 
-from sandmould.report.drive import drive_at
 from sandmould.report.optimum import TWO_SIDED, OptimumPages
 from sandmould.report.robustness import RobustnessPages
 from sandmould.report.tables import Cell, Column, KeyNumber, Table, share_of_what_fits
+from sandmould.runs.columns import finished
 from sandmould.runs.formatting import (
     display_scale,
     filled_space,
@@ -23,7 +25,7 @@ from sandmould.runs.formatting import (
     with_margin,
 )
 from sandmould.runs.templates import Note, worded
-from sandmould.scenario.drive import BoxDrive
+from sandmould.scenario.drive import DISPLACEMENT, VELOCITY, BoxDrive
 from sandmould.statistics.answer import Answer
 from sandmould.statistics.config import FULL_SHARE
 from sandmould.statistics.evidence import usable_values
@@ -33,6 +35,7 @@ from sandmould.wording.answer import OF_DRIVE, AnswerWords, place_text
 from sandmould.wording.next_steps import NextSteps
 from sandmould.wording.robustness import recommendation_sentence
 
+_AMPLITUDES = (DISPLACEMENT, VELOCITY)
 MOST_CHOICES = 12
 """Settings that the first screen lists."""
 
@@ -91,6 +94,36 @@ def optimum_headline(
         is_vague=optimum.is_vague,
     )  # fmt: skip
     return said, pages.sound
+
+
+def drive_at(
+    summary: pd.DataFrame, keys: Sequence[str], setting: Mapping[str, float]
+) -> BoxDrive | None:
+    """The drive between the settings of a sweep; None where runs have none.
+
+    Over one key logarithms are interpolated between the means of its settings, which is exact for
+    an amplitude that is held. Over several keys it is the nearest setting's, each key over its
+    range.
+    """
+    if not all(column in summary for column in _AMPLITUDES):
+        return None
+    rows = summary[finished(summary)].dropna(subset=[*_AMPLITUDES, *keys])
+    if rows.empty:
+        return None
+    means = rows.groupby(list(keys))[list(_AMPLITUDES)].mean().reset_index()
+    at = means[list(keys)].to_numpy(dtype=np.float64)
+    wanted = np.array([setting[key] for key in keys])
+    values = means[list(_AMPLITUDES)].to_numpy(dtype=np.float64)
+    if len(keys) == 1 and (at > 0).all() and (values > 0).all():
+        x, log = np.log(wanted[0]), np.log(values)
+        found = np.exp([np.interp(x, np.log(at[:, 0]), log[:, i]) for i in range(len(_AMPLITUDES))])
+    else:
+        width = np.maximum(np.ptp(at, axis=0), np.finfo(float).tiny)
+        found = values[int((((at - wanted) / width) ** 2).sum(axis=1).argmin())]
+    displacement_m, velocity_m_s = found.tolist()
+    if not displacement_m > 0.0:
+        return None
+    return BoxDrive(velocity_m_s / displacement_m / (2 * math.pi), displacement_m)
 
 
 def share_at(optimum: Optimum, summary: pd.DataFrame, measure: str) -> float:

@@ -22,7 +22,7 @@ from sandmould.pattern_fe.quality import mesh_sentence
 from sandmould.pattern_fe.scene import pattern_of
 from sandmould.report.bending_figures import coupling_map, draw_distances, draw_outlines
 from sandmould.report.curves import runs_by_setting, setting_tints, time_chart
-from sandmould.report.tables import Cell, Column, Table, number_cell
+from sandmould.report.tables import Cell, Column, Table, cells
 from sandmould.runs.columns import RUN, SOLID_FRACTION, TIME_S, VIBRATION_TIME_S
 from sandmould.runs.formatting import setting_text
 from sandmould.runs.templates import sentences
@@ -250,18 +250,10 @@ def _runs_table(
         run = str(planned[RUN])
         loop_verdict, measures = verdicts.get(run), last.get(run, pd.Series(dtype=np.float64))
         setting = setting_text({key: planned[key] for key in collected.keys})
-        rows.append(
-            (
-                Cell(run, run),
-                *([Cell(setting, setting)] if collected.keys else []),
-                _loop_cell(loop_verdict),
-                *(
-                    number_cell(factor * float(measures.get(name, math.nan)))
-                    for _, name, factor, _ in _COLUMNS
-                ),
-                *(_file_cell(study_folder, href, run, suffix) for suffix in ("vtu", "stl")),
-            )
-        )
+        named = (run, setting) if collected.keys else (run,)
+        values = (factor * measures.get(name, math.nan) for _, name, factor, _ in _COLUMNS)
+        files = (_file_cell(study_folder, href, run, suffix) for suffix in ("vtu", "stl"))
+        rows.append(cells(*named, _loop_cell(loop_verdict), *values, *files))
         marked.append(loop_verdict is None or loop_verdict.state != "holds")
     return Table(columns, tuple(rows), tuple(marked))
 

@@ -62,14 +62,16 @@ def grain_size_pages(
         return None
     narrow = [name for space in narrow_spaces(scenario) for name in space.names]
     beside = [c for c in changes if c.measure in asked[1:] and c.label == best]
+    first, *others = of_objective
+    order = order_of(first, others[0], objective.better) if others else ""
     short, said = (
         sentences(
             "grain_size.j2",
             changes=of_objective,
             shown=[*told, *beside],
             factor=f"{FACTOR:g}",
-            two=len(of_objective) > 1,
-            order=order_of(*of_objective[:2], objective.better) if len(of_objective) > 1 else "",
+            two=bool(others),
+            order=order,
             narrow=narrow,
         )
         for told in (of_objective[:1], of_objective)

@@ -11,7 +11,7 @@ import numpy as np
 
 from sandmould.engines.snapshot import scene_at
 from sandmould.kinds.sand.moments import list_moments
-from sandmould.report.tables import Cell, Column, Table
+from sandmould.report.tables import Cell, Column, Table, cells
 from sandmould.runs.formatting import number
 from sandmould.runs.templates import sentences
 from sandmould.scenario.scenario import Scenario
@@ -87,9 +87,8 @@ def _table(zones: Sequence[LooseZone], scenario: Scenario) -> Table:
     rows = []
     for place, zone in enumerate(zones, start=1):
         where = f"{'in' if zone.is_inside else zone.side} the {zone.near.replace('_', ' ')}"
-        cells = [Cell(str(place), str(place)), Cell(where, where)]
-        for low, high in zip(1e3 * zone.low_m, 1e3 * zone.high_m, strict=True):
-            cells.append(Cell(f"{low:.0f} to {high:.0f}", str(low)))
+        ends = zip(1e3 * zone.low_m, 1e3 * zone.high_m, strict=True)
+        box = (Cell(f"{low:.0f} to {high:.0f}", str(low)) for low, high in ends)
         values = (_MM[scenario.dimension] * zone.measure, zone.measure / grain, zone.solid_fraction)
-        rows.append((*cells, *(Cell(number(value, 3), str(value)) for value in values)))
+        rows.append(cells(str(place), where, *box, *values))
     return Table(columns, tuple(rows), (False,) * len(rows))

@@ -15,13 +15,7 @@ from sandmould.analysis.plots import LAYER_COLOURS
 from sandmould.bad_input import BadInputError, Problem
 from sandmould.casting.arpm.scene import solids_of
 from sandmould.drawing.figure_files import page_environment
-from sandmould.drawing.figures import (
-    cut_m,
-    dimensioned,
-    png,
-    png_bytes,
-    svg_bytes,
-)
+from sandmould.drawing.figures import cut_m, dimensioned, png, png_bytes, svg_bytes
 from sandmould.drawing.sphere_film import SphereFilm, sphere_frames
 from sandmould.drawing.sphere_scene import solid_scene, sphere_scene
 from sandmould.engines.snapshot import Snapshot

@@ -216,6 +216,17 @@ def number_cell(value: float, digits: int = 3) -> Cell:
     return Cell(number(value, digits), str(value))
 
 
+def cells(*values: str | float | Cell) -> tuple[Cell, ...]:
+    """A row, or a part of it: texts are sorted as they stand, numbers by their value."""
+    return tuple(map(_cell, values))
+
+
+def _cell(value: str | float | Cell) -> Cell:
+    if isinstance(value, Cell):
+        return value
+    return Cell(value, value) if isinstance(value, str) else number_cell(float(value))
+
+
 _COST = (
     (columns.GRAINS, "grains", lambda v: f"{v:.0f}"),
     ("elements", "elements", lambda v: f"{v:.0f}"),

@@ -10,13 +10,7 @@ from sandmould.definition.certificate import frequency_key
 from sandmould.definition.study import Study
 from sandmould.kinds.sand.kind import SandStudy
 from sandmould.kinds.sand.narrow import Narrow
-from sandmould.runs.formatting import (
-    filled_space,
-    listed,
-    name_of,
-    value_text,
-    with_article,
-)
+from sandmould.runs.formatting import filled_space, listed, name_of, value_text, with_article
 from sandmould.runs.templates import worded
 from sandmould.statistics.answer import Answer, Decided
 from sandmould.statistics.config import fewest_points
@@ -224,12 +218,8 @@ def certificate_steps(study: Study, answer: Answer) -> list[NextStep]:
     """The controls of a best frequency, where none were asked for."""
     is_best = answer.best is not None and study.seeks_best
     is_swept = study.sweep.number_of_points > 1 and frequency_key(study.sweep)
-    if (
-        not isinstance(study, SandStudy)
-        or not is_best
-        or not is_swept
-        or study.certificate.controls
-    ):
+    is_open = is_best and is_swept and not study.certificate.controls
+    if not isinstance(study, SandStudy) or not is_open:
         return []
     fewest = fewest_points(1)
     if study.sweep.number_of_points < fewest:

@@ -13,7 +13,6 @@ from pathlib import Path
 import numpy as np
 import pandas as pd
 from matplotlib import colormaps
-from matplotlib.axes import Axes
 from matplotlib.colors import to_hex
 from matplotlib.figure import Figure
 from numpy.typing import NDArray
@@ -36,10 +35,10 @@ from sandmould.drawing.flow_film import SHADES, make_flow_film
 from sandmould.report import flow_charts
 from sandmould.report.curves import measure_curves
 from sandmould.report.kinds.kind import Findings, KindPages, KindReport
-from sandmould.report.tables import Cell, Column, ReportPicture, Table, number_cell
+from sandmould.report.tables import Cell, Column, ReportPicture, Table, cells, number_cell
 from sandmould.runs.columns import CLASSIFICATION, DETAIL, HOPS, OUTCOME_CODE, RUN
 from sandmould.runs.formatting import name_of, setting_text
-from sandmould.runs.templates import Note, notes, sentences, worded
+from sandmould.runs.templates import notes, sentences, worded
 from sandmould.scenario.casting.flow import MetalFlow, PouredMetal, StillTank
 from sandmould.study.collect import Collected
 from sandmould.wording.next_steps import NextStep
@@ -112,7 +111,18 @@ def _pages(findings: Findings[MetalFlow], film_budget_bytes: int) -> KindPages:
     }
     return KindPages(
         "flow.html",
-        _method(scenario, keys),
+        notes(
+            "flow_method.j2",
+            flow=scenario,
+            case=scenario.case,
+            papers=PAPERS,
+            gravity_m_s2=G_M_S2,
+            scheme=scene.scheme_of(scenario),
+            collides_as_swept="collision_distance" in keys,
+            quiet_pa=QUIET_PA,
+            most_off=MOST_OFF,
+            swept=[name_of(key) for key in keys],
+        ),
         context={"pages": shown},
         figures={
             **pictures(stability_map=stable, fields=fields),
@@ -262,9 +272,9 @@ def _noise(scenario: MetalFlow, ranked: pd.DataFrame, keys: Sequence[str]) -> Ta
     for (_, row), text in zip(ranked.iterrows(), said, strict=True):
         label = flow_charts.condition_text({key: row[key] for key in keys})
         note = str(row[DETAIL]) if str(row[DETAIL]) != "nan" else ""
-        cells = [Cell(label, label), Cell(str(row[CLASSIFICATION]), str(row["rank"]), note=note)]
-        cells += [number_cell(float(row.get(of, np.nan)), digits) for _, of, digits in measured]
-        rows.append((*cells, Cell(text, text)) if any(said) else tuple(cells))
+        verdict = Cell(str(row[CLASSIFICATION]), str(row["rank"]), note=note)
+        values = (number_cell(float(row.get(of, np.nan)), digits) for _, of, digits in measured)
+        rows.append(cells(label, verdict, *values, *([text] if any(said) else [])))
     failed = tuple(c == StabilityRating.FAILED.value for c in ranked[CLASSIFICATION])
     return Table(tuple(columns), tuple(rows), failed)
 
@@ -273,7 +283,13 @@ def _fields(runs: Sequence[_PicturedRun], highest_pa: float) -> str:
     """Pressure over the particles at the end of each run, as the paper's figures 3 and 8."""
     if not runs:
         return ""
-    figure, panels = _grid(len(runs), 4.2)
+    across = min(len(runs), 3)
+    rows = -(-len(runs) // across)
+    size = (1.0 + 3.4 * across, 4.2 * rows + 0.6)
+    figure = Figure(figsize=size, dpi=100, layout="constrained")
+    panels = list(figure.subplots(rows, across, squeeze=False).ravel())
+    for axes in panels[len(runs) :]:
+        axes.set_axis_off()
     for axes, run in zip(panels, runs, strict=False):
         fields = _load(run.folder)
         last = frame_of(fields, len(fields["count"]) - 1)
@@ -281,37 +297,8 @@ def _fields(runs: Sequence[_PicturedRun], highest_pa: float) -> str:
         heading = f"{run.label}\n{run.verdict}, {last.time_s:.3g} s"
         axes.set_title(heading, fontsize=8, parse_math=False)
         axes.tick_params(labelsize=8)
-    figure.colorbar(discs, ax=panels, label="pressure, Pa", shrink=0.6, extend="max")
+    figure.colorbar(discs, ax=panels[: len(runs)], label="pressure, Pa", shrink=0.6, extend="max")
     return png(figure)
-
-
-def _grid(count: int, height: float) -> tuple[Figure, list[Axes]]:
-    """A figure of so many panels, three in a row."""
-    across = min(count, 3)
-    rows = -(-count // across)
-    figure = Figure(
-        figsize=(1.0 + 3.4 * across, height * rows + 0.6), dpi=100, layout="constrained"
-    )
-    panels = figure.subplots(rows, across, squeeze=False).ravel()
-    for axes in panels[count:]:
-        axes.set_axis_off()
-    return figure, list(panels[:count])
-
-
-def _method(scenario: MetalFlow, keys: Sequence[str]) -> tuple[Note, ...]:
-    """How the runs were computed; see ``sand_method``."""
-    return notes(
-        "flow_method.j2",
-        flow=scenario,
-        case=scenario.case,
-        papers=PAPERS,
-        gravity_m_s2=G_M_S2,
-        scheme=scene.scheme_of(scenario),
-        collides_as_swept="collision_distance" in keys,
-        quiet_pa=QUIET_PA,
-        most_off=MOST_OFF,
-        swept=[name_of(key) for key in keys],
-    )
 
 
 REPORT = KindReport(_pages, _notes)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from typing import Any
 
 import pandas as pd
@@ -11,7 +12,6 @@ from sandmould.drawing.figure_files import pictures, strip
 from sandmould.kinds.sand.narrow import narrow_spaces
 from sandmould.report.bed_mode import bed_mode
 from sandmould.report.curves import curve_figures
-from sandmould.report.drive import drive_of
 from sandmould.report.filling import FillingPages, filling_pages
 from sandmould.report.grain_size import grain_size_pages
 from sandmould.report.kinds.kind import Findings, KindPages, KindReport
@@ -31,6 +31,7 @@ from sandmould.runs.columns import (
 )
 from sandmould.runs.formatting import number, setting_text
 from sandmould.runs.templates import worded
+from sandmould.scenario.drive import DISPLACEMENT, BoxDrive, laid_down_drive
 from sandmould.scenario.hardness import DEEP_OVERLAP, LEAST_KAPPA, bed_hardness
 from sandmould.scenario.scenario import Scenario
 from sandmould.statistics.verdict import Verdict
@@ -50,6 +51,21 @@ def _notes(
     varied = [key for key in collected.keys if collected.summary[key].nunique() > 1]
     notes = sand_limits(varied, stage, seeks_best and not is_controlled, bool(has_coarser))
     return (*_steps_above_limit(collected.summary), *notes)
+
+
+def drive_of(scenario: Scenario, runs: pd.DataFrame) -> BoxDrive | None:
+    """Drive of the first vibration of a setting; None where there is none, or none was measured.
+
+    ``runs``: rows of the summary at the setting: a table on mounts moves as it was measured.
+    """
+    if not scenario.vibrations:
+        return None
+    stage = scenario.vibrations[0]
+    if stage.unbalance is None:
+        return laid_down_drive(stage)
+    measured = runs.loc[finished(runs), DISPLACEMENT] if DISPLACEMENT in runs else pd.Series()
+    displacement_m = float(pd.to_numeric(measured).mean())
+    return BoxDrive(stage.frequency_hz, displacement_m) if math.isfinite(displacement_m) else None
 
 
 def _pages(findings: Findings[Scenario], film_budget_bytes: int) -> KindPages:

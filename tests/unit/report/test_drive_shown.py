@@ -6,7 +6,8 @@ import numpy as np
 import pandas as pd
 import pytest
 
-from sandmould.report.drive import drive_at, drive_of
+from sandmould.report.answer import drive_at
+from sandmould.report.kinds.sand import drive_of
 from sandmould.runs.columns import OUTCOME_CODE
 from sandmould.scenario.drive import DISPLACEMENT, VELOCITY, BoxDrive
 from sandmould.scenario.scenario import Scenario
