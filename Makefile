@@ -199,7 +199,6 @@ decks: $(INSTALLED)
 ## config/schema.json, config/default.yaml and docs/{measures,limits,keys,files,commands}.md from the types
 schema: $(INSTALLED)
 	$(BIN)/python -m sandmould.reference.schema
-	$(BIN)/python -m sandmould.reference.reference
 	$(BIN)/python -m sandmould.cli.reference
 
 ## pin all dependencies in requirements.lock, for every Python and platform that is supported

@@ -39,9 +39,6 @@ from sandmould.study.plan.build_plan import RESULTS, Plan, checked_plan, open_pl
 from sandmould.study.plan.plan_files import VERDICT_FILE, plan_rows, read_run
 from sandmould.study.plan.price import study_s
 
-AXES = ("x", "z"), ("x", "y", "z")
-"""Names of the coordinates in 2D and in 3D; z is up."""
-
 
 @dataclass(frozen=True)
 class Picture:
@@ -172,15 +169,12 @@ class Result:
             Where there is no such run, or no record up to that time.
         """
         snapshot = self._snapshot(run, time_s)
-        axes = AXES[snapshot.position_m.shape[1] - 2]
-        columns: dict[str, Any] = {
-            "id": snapshot.id, "layer": snapshot.layer, "radius_m": snapshot.radius_m
-        }  # fmt: skip
-        for i, axis in enumerate(axes):
-            columns |= {f"{axis}_m": snapshot.position_m[:, i]}
-        for i, axis in enumerate(axes):
-            columns |= {f"{axis}_m_s": snapshot.velocity_m_s[:, i]}
-        table = pd.DataFrame(columns)
+        axes = "xz" if snapshot.position_m.shape[1] == 2 else "xyz"
+        table = pd.DataFrame(
+            {name: getattr(snapshot, name) for name in ("id", "layer", "radius_m")}
+        )
+        table[[f"{axis}_m" for axis in axes]] = snapshot.position_m
+        table[[f"{axis}_m_s" for axis in axes]] = snapshot.velocity_m_s
         table.attrs["time_s"] = snapshot.time_s
         return table
 

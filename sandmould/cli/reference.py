@@ -1,4 +1,4 @@
-"""The page of all commands: ``python -m sandmould.cli.reference`` writes ``docs/commands.md``."""
+"""The page of all commands; ``python -m sandmould.cli.reference`` writes all generated pages."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ from typer.main import get_command
 
 from sandmould.cli.commands import app
 from sandmould.module_main import run_main
-from sandmould.reference.reference import DOCS, page
+from sandmould.reference.reference import DOCS, page, pages
 
 COMMANDS = DOCS / "commands.md"
 _WIDTH = 100
@@ -28,8 +28,9 @@ def commands_page() -> str:
 
 
 def main() -> None:
-    """Write the page."""
-    COMMANDS.write_text(commands_page(), encoding="utf-8")
+    """Write the pages."""
+    for path, text in {**pages(), COMMANDS: commands_page()}.items():
+        path.write_text(text, encoding="utf-8")
 
 
 if __name__ == "__main__":

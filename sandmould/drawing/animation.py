@@ -18,7 +18,6 @@ from typing import TypeVar
 import numpy as np
 from numpy.typing import NDArray
 
-from sandmould.engines.snapshot import Snapshot
 from sandmould.kinds.sand.moments import Moment, list_moments
 
 BUDGET_BYTES = 2_500_000
@@ -31,10 +30,16 @@ ABSENT = 65535
 """Coordinate of a grain that has not been filled in yet."""
 
 
+@dataclass(frozen=True, kw_only=True)
 class PackedFilm:
-    """A film whose frames are packed into one text."""
+    """A film of one run whose frames are packed into one text, as the page reads it."""
 
-    data: str
+    run: str
+    label: str = ""
+    time_s: tuple[float, ...] = (0.0,)
+    quantum_m: float = 1.0
+    data: str = ""
+    """Base64 of deflated bytes."""
 
     @property
     def values(self) -> dict[str, object]:
@@ -45,28 +50,31 @@ class PackedFilm:
 FilmT = TypeVar("FilmT", bound=PackedFilm)
 
 
-@dataclass(frozen=True)
-class Film(PackedFilm):
-    """Frames of one run as the page reads them; coordinates are the box's own, in m."""
+@dataclass(frozen=True, kw_only=True)
+class GrainFilm(PackedFilm):
+    """Frames of grains, of none unless given; coordinates are the box's own, in m."""
 
-    run: str
-    label: str
-    grains: int
-    time_s: tuple[float, ...]
-    vibration_time_s: tuple[float | None, ...]
+    grains: int = 0
+    vibration_time_s: tuple[float | None, ...] = (None,)
     """None before the first vibration."""
-    stage: tuple[str, ...]
-    reading: tuple[float | None, ...]
+    stage: tuple[str, ...] = ("",)
+    reading: tuple[float | None, ...] = (None,)
     """The objective at each frame, if known."""
-    origin_m: tuple[float, ...]
-    quantum_m: float
-    largest_radius_m: float
+    origin_m: tuple[float, ...] = (0.0, 0.0, 0.0)
+    largest_radius_m: float = 1.0
+
+
+@dataclass(frozen=True, kw_only=True)
+class Film(GrainFilm):
+    """Discs.
+
+    ``data`` has coordinates by axis, frame and grain; radii (uint16, shares of the largest, low
+    bytes first); layers (uint8).
+    """
+
     bent: tuple[tuple[int, ...], ...]
     """Outline of a pattern at each frame, x and y of one vertex after another in ``BENT_M``; empty
     without one."""
-    data: str
-    """Base64 of deflated bytes: coordinates by axis, frame and grain; radii (uint16, shares of
-    the largest, low bytes first); layers (uint8)."""
 
 
 def make_film(
@@ -77,17 +85,7 @@ def make_film(
 ) -> Film | None:
     """Pack the snapshots of a run; frames are left out to keep the budget, grains never.
 
-    Parameters
-    ----------
-    reading : ((k,) float64 s, (k,) float64), optional
-        Times and values of the objective.
-    budget_bytes : int
-        Most that ``data`` may weigh.
-
-    Returns
-    -------
-    Film or None
-        None without a readable snapshot.
+    ``reading``: times, s, and values of the objective. None without a readable snapshot.
     """
     moments = list_moments(run_folder)
     if not moments:
@@ -107,14 +105,8 @@ def within_budget(
 ) -> FilmT:
     """Pack frames evenly over a run, fewer and fewer until they weigh little enough.
 
-    Parameters
-    ----------
-    pack : callable
-        Gives the film of some frames, by their places.
-    total, count : int
-        Frames of the run, and how many are tried first.
-    budget_bytes : int
-        Most that the film's data may weigh; two frames are kept whatever they weigh.
+    ``pack`` gives the film of some frames of ``total``, by their places; ``count`` are tried first,
+    and two are kept whatever they weigh.
     """
     while True:
         film = pack(evenly(total, count).tolist())
@@ -166,14 +158,13 @@ def _pack(
         origin_m=tuple(origin_m.tolist()),
         quantum_m=quantum_m,
         largest_radius_m=largest_m,
-        bent=tuple(_outline(f) for f in frames if f.pattern_m is not None),
+        bent=tuple(
+            tuple(np.rint(f.pattern_m / BENT_M).astype(np.int64).ravel().tolist())
+            for f in frames
+            if f.pattern_m is not None
+        ),
         data=encoded(raw),
     )
-
-
-def _outline(frame: Snapshot) -> tuple[int, ...]:
-    assert frame.pattern_m is not None
-    return tuple(np.rint(frame.pattern_m / BENT_M).astype(np.int64).ravel().tolist())
 
 
 def changes(place: NDArray[np.uint16]) -> NDArray[np.uint16]:
@@ -199,13 +190,7 @@ def readings_at(
     time_s: NDArray[np.float64],
     reading: tuple[NDArray[np.float64], NDArray[np.float64]] | None,
 ) -> tuple[float | None, ...]:
-    """Values at each frame, from those that are known; None outside them.
-
-    Parameters
-    ----------
-    time_s : (frames,) float64, s
-    reading : ((k,) float64 s, (k,) float64) or None
-    """
+    """Values at each frame, from those that are known; None outside them."""
     if reading is None or not len(reading[0]):
         return (None,) * len(time_s)
     values = np.interp(time_s, *reading, left=np.nan, right=np.nan)

@@ -55,6 +55,11 @@ def tints(n: int, ordered: bool) -> tuple[Tint, ...]:
     )
 
 
+def thinned(xy: NDArray[np.float64], stride: int) -> NDArray[np.float64]:
+    """Every so many points of a curve, all below two; the last one is kept."""
+    return np.concatenate([xy[: -1 : max(1, stride)], xy[-1:]])
+
+
 LineStyle = Literal["run", "mean", "joined", "behind"]
 """Thin for one run or edge, thick for a mean, dotted between points that it only joins, faint
 behind others."""
@@ -187,14 +192,6 @@ class LaidMark:
 
 
 @dataclass(frozen=True)
-class LaidArea:
-    """An area in pixels."""
-
-    area: Area
-    path: str
-
-
-@dataclass(frozen=True)
 class Laid:
     """A chart in pixels, as ``chart.svg`` draws it."""
 
@@ -209,30 +206,26 @@ class Laid:
     x_ticks: tuple[Tick, ...]
     y_ticks: tuple[Tick, ...]
     rows: tuple[Tick, ...]
-    areas: tuple[LaidArea, ...]
+    areas: tuple[tuple[Area, str], ...]
+    """Each with its path in pixels."""
     lines: tuple[LaidLine, ...]
     marks: tuple[LaidMark, ...]
 
 
 def lay_out(chart: Chart, size: tuple[int, int]) -> Laid:
-    """Place a chart on a drawing of so many pixels.
-
-    Parameters
-    ----------
-    size : (int, int), px
-        Width and height; rows of settings make the drawing as high as they need.
-    """
+    """Place a chart on a drawing of so many pixels; rows make it as high as they need."""
     width, height = float(size[0]), float(size[1])
     if chart.rows:
         height = 66.0 + 42.0 * len(chart.rows)
-    y_low, y_high = _log_range(_ys(chart)) if chart.log_y else _range(_ys(chart))
+    ys = _values(chart, 1)
+    y_low, y_high = _log_range(ys) if chart.log_y else _range(ys)
     if chart.frame:
         y_low, y_high = chart.frame[1]
     y_ticks = () if chart.rows else _ticks(y_low, y_high, max(3, int(height / 55)), chart.log_y)
     y_text = [_text(t, y_ticks, chart.log_y) for t in y_ticks]
     margin = 14.0 if chart.rows else 12.0 + _CHARACTER * max(map(len, y_text), default=1)
     label = max((len(line.label) for line in chart.lines), default=0)
-    xs = _xs(chart)
+    xs = [*_values(chart, 0), *chart.x_ticks, *(chart.band or ())]
     x_low, x_high = _log_range(xs) if chart.log_x else _range(xs, tight=not chart.marks)
     if chart.frame:
         x_low, x_high = chart.frame[0]
@@ -243,6 +236,7 @@ def lay_out(chart: Chart, size: tuple[int, int]) -> Laid:
     y = Axis(-0.7, len(chart.rows) - 0.3, 10.0, foot) if chart.rows else None
     y = y or Axis(y_low, y_high, foot, 34.0 if chart.y_title else 10.0, chart.log_y)
     x_ticks = chart.x_ticks or _ticks(x_low, x_high, max(4, int(width / 80)), chart.log_x)
+    marks = (_laid_mark(mark, x, y, bool(chart.rows)) for mark in chart.marks)
     return Laid(
         chart=chart,
         width=width,
@@ -256,27 +250,18 @@ def lay_out(chart: Chart, size: tuple[int, int]) -> Laid:
         rows=tuple(Tick(y.at(i), name) for i, name in enumerate(chart.rows)),
         areas=tuple(_laid_area(area, x, y) for area in chart.areas),
         lines=_laid_lines(chart.lines, x, y),
-        marks=_laid_marks(chart, x, y),
+        marks=tuple(m for m in marks if math.isfinite(m.x) and math.isfinite(m.y)),
     )
 
 
-def _xs(chart: Chart) -> list[float]:
-    """All values along x, ends of lying intervals included."""
-    xs = [v for line in chart.lines for v in line.xy[:, 0].tolist()]
-    xs += [*chart.x_ticks, *(chart.band or ())]
+def _values(chart: Chart, axis: int) -> list[float]:
+    """All values along x (0) or y (1), ends of intervals that lie along it included."""
+    values = [v for line in chart.lines for v in line.xy[:, axis].tolist()]
+    has_intervals, is_logarithmic = (axis == 1, chart.log_y) if axis else (chart.rows, chart.log_x)
     for mark in chart.marks:
-        reach = mark.half_width if chart.rows and math.isfinite(mark.half_width) else 0.0
-        xs += _ends(mark.x, reach, chart.log_x)
-    return xs
-
-
-def _ys(chart: Chart) -> list[float]:
-    """All values along y, ends of standing intervals included."""
-    ys = [v for line in chart.lines for v in line.xy[:, 1].tolist()]
-    for mark in chart.marks:
-        reach = mark.half_width if math.isfinite(mark.half_width) else 0.0
-        ys += _ends(mark.y, reach, chart.log_y)
-    return ys
+        reach = mark.half_width if has_intervals and math.isfinite(mark.half_width) else 0.0
+        values += _ends((mark.x, mark.y)[axis], reach, is_logarithmic)
+    return values
 
 
 def _ends(value: float, reach: float, is_logarithmic: bool) -> list[float]:
@@ -350,11 +335,11 @@ def _not_touching(ticks: Sequence[Tick]) -> tuple[Tick, ...]:
     return tuple(labelled)
 
 
-def _laid_area(area: Area, x: Axis, y: Axis) -> LaidArea:
+def _laid_area(area: Area, x: Axis, y: Axis) -> tuple[Area, str]:
     along = np.concatenate([area.x, area.x[::-1]]).tolist()
     up = np.concatenate([area.low, area.high[::-1]]).tolist()
     points = (f"{x.at(u):.1f},{y.reached(v):.1f}" for u, v in zip(along, up, strict=True))
-    return LaidArea(area, f"M{'L'.join(points)}Z")
+    return area, f"M{'L'.join(points)}Z"
 
 
 def _laid_lines(lines: Sequence[Line], x: Axis, y: Axis) -> tuple[LaidLine, ...]:
@@ -368,16 +353,11 @@ def _laid_lines(lines: Sequence[Line], x: Axis, y: Axis) -> tuple[LaidLine, ...]
         laid.append((line, path, pixels[-1]))
     labelled = [(i, end[1]) for i, (line, _, end) in enumerate(laid) if line.label]
     heights = dict(_spread(labelled, y.end, y.start))
-    return tuple(
-        LaidLine(
-            line,
-            path,
-            end,
-            (x.end if line.style == "mean" else end[0]) + _BESIDE,
-            heights.get(i, end[1]),
-        )
-        for i, (line, path, end) in enumerate(laid)
-    )
+    placed = []
+    for i, (line, path, end) in enumerate(laid):
+        label_x = (x.end if line.style == "mean" else end[0]) + _BESIDE
+        placed.append(LaidLine(line, path, end, label_x, heights.get(i, end[1])))
+    return tuple(placed)
 
 
 def _spread(
@@ -394,12 +374,6 @@ def _spread(
         placed[place] = (i, min(at, limit))
         limit = placed[place][1] - _LINE
     return placed
-
-
-def _laid_marks(chart: Chart, x: Axis, y: Axis) -> tuple[LaidMark, ...]:
-    """All points that have a place."""
-    laid = (_laid_mark(mark, x, y, bool(chart.rows)) for mark in chart.marks)
-    return tuple(mark for mark in laid if math.isfinite(mark.x) and math.isfinite(mark.y))
 
 
 def _laid_mark(mark: Mark, x: Axis, y: Axis, lying: bool) -> LaidMark:

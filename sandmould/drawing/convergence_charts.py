@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-
 import numpy as np
 import pandas as pd
 
@@ -12,35 +10,25 @@ from sandmould.runs.columns import TIME_S
 
 _POINTS = 400
 """Of a curve; windows between two of them are averaged."""
+_Curve = tuple[str, str, float, LineStyle]
+"""Column, label, factor and style."""
 
 
-@dataclass(frozen=True)
-class ConvergenceChart:
-    """A chart and what it shows."""
-
-    chart: Chart
-    caption: str
-
-
-@dataclass(frozen=True)
-class _Curve:
-    column: str
-    label: str
-    factor: float = 1.0
-    style: LineStyle = "run"
-
-
-def convergence_charts(log: pd.DataFrame, begins_s: float) -> tuple[ConvergenceChart, ...]:
-    """Draw the convergence log of a run of any scheme.
+def convergence_charts(log: pd.DataFrame, begins_s: float) -> tuple[tuple[Chart, str], ...]:
+    """Draw the convergence log of a run of any scheme: charts, each with its caption.
 
     ``begins_s``: when vibration begins: zero of the charts.
     """
-    windows = _averaged(log)
+    # means over so many windows that few points are left
+    windows = log.groupby(np.arange(len(log)) // -(-len(log) // _POINTS)).mean()
     windows[TIME_S] -= begins_s
-    panels = [
+    panels: list[tuple[str, tuple[_Curve, ...], str]] = [
         (
             "displacement, mm",
-            (_Curve("displacement_m", "shown", 1e3, "mean"), _Curve("residual_m", "residual", 1e3)),
+            (
+                ("displacement_m", "shown", 1e3, "mean"),
+                ("residual_m", "residual", 1e3, "run"),
+            ),
             "Root mean square over the surface's vertices: of the displacement that the sand saw, "
             "and of the residual. The residual is the displacement that the sand's loads give, "
             "less the one it saw.",
@@ -48,11 +36,11 @@ def convergence_charts(log: pd.DataFrame, begins_s: float) -> tuple[ConvergenceC
         (
             "energy, J",
             (
-                _Curve("work_j", "work of sand", style="mean"),
-                _Curve("energy_j", "stored"),
-                _Curve("elastic_j", "stored"),
-                _Curve("kinetic_j", "kinetic"),
-                _Curve("damped_j", "damped"),
+                ("work_j", "work of sand", 1.0, "mean"),
+                ("energy_j", "stored", 1.0, "run"),
+                ("elastic_j", "stored", 1.0, "run"),
+                ("kinetic_j", "kinetic", 1.0, "run"),
+                ("damped_j", "damped", 1.0, "run"),
             ),
             "Work of the sand on the surface since the run began, and where it went. Stored "
             "energy above the work came from the loop itself.",
@@ -63,37 +51,25 @@ def convergence_charts(log: pd.DataFrame, begins_s: float) -> tuple[ConvergenceC
         panels.append(
             (
                 "share of the residual",
-                (_Curve("factor", "gone"), _Curve("limit", "limit")),
+                (("factor", "gone", 1.0, "run"), ("limit", "limit", 1.0, "run")),
                 "Share of the residual that is gone next. Where the gain was measured, the limit "
                 "of a fixed share, 2 / (1 + gain), stands beside it.",
             )
         )
     return tuple(
-        ConvergenceChart(chart, caption)
+        (chart, caption)
         for title, curves, caption in panels
         if (chart := _chart(windows, title, curves)) is not None
     )
 
 
-def _averaged(log: pd.DataFrame) -> pd.DataFrame:
-    """Means over so many windows that few points are left."""
-    together = -(-len(log) // _POINTS)
-    return log.groupby(np.arange(len(log)) // together).mean()
-
-
 def _chart(windows: pd.DataFrame, title: str, curves: tuple[_Curve, ...]) -> Chart | None:
-    there = [c for c in curves if c.column in windows and windows[c.column].notna().any()]
+    there = [c for c in curves if c[0] in windows and windows[c[0]].notna().any()]
     if not there:
         return None
-    lines = tuple(
-        Line(
-            np.column_stack([windows[TIME_S], curve.factor * windows[curve.column]]),
-            tint,
-            curve.style,
-            label=curve.label,
-            title=curve.label,
-        )
-        for curve, tint in zip(there, tints(len(there), False), strict=True)
-    )
-    alt = f"{title} against time since vibration began: {', '.join(c.label for c in there)}."
-    return Chart("time since vibration began, s", title, alt, lines)
+    lines = []
+    for (column, label, factor, style), tint in zip(there, tints(len(there), False), strict=True):
+        xy = np.column_stack([windows[TIME_S], factor * windows[column]])
+        lines.append(Line(xy, tint, style, label, label))
+    alt = f"{title} against time since vibration began: {', '.join(c[1] for c in there)}."
+    return Chart("time since vibration began, s", title, alt, tuple(lines))

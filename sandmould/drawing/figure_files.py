@@ -1,4 +1,4 @@
-"""Figures of a report as files of their own, for slides, papers and committed records."""
+"""Templates of pages, and figures of a report as files, for slides, papers and records."""
 
 from __future__ import annotations
 
@@ -8,23 +8,36 @@ import shutil
 from collections.abc import Iterable, Mapping, Sequence
 from pathlib import Path
 
-from jinja2 import Environment
+from jinja2 import Environment, FileSystemLoader, StrictUndefined
+from jinja2.sandbox import ImmutableSandboxedEnvironment
 
+from sandmould import SHIPPED
 from sandmould.drawing.chart import WIDE, Chart, lay_out
+from sandmould.kept_templates import kept_templates
+from sandmould.runs.formatting import number, opened
 
+TEMPLATES = SHIPPED / "templates" / "report"
 _PICTURE_IN = 4.2
 _HEADING_IN = 0.3
 """Width of a picture in a strip, and room over it, inches."""
 
 
-def strip(panels: Sequence[tuple[str, str]]) -> bytes:
-    """Pictures side by side under their headings, as one PNG.
+def page_environment() -> Environment:
+    """Templates of pages: names are escaped, and a missing value is an error."""
+    environment = ImmutableSandboxedEnvironment(
+        loader=FileSystemLoader(TEMPLATES),
+        undefined=StrictUndefined,
+        bytecode_cache=kept_templates(),
+        autoescape=True,
+        trim_blocks=True,
+        lstrip_blocks=True,
+    )
+    environment.filters |= {"number": number, "opened": opened}
+    return environment
 
-    Parameters
-    ----------
-    panels : sequence of (str, str)
-        At least one heading and ``data:`` address, all of one size.
-    """
+
+def strip(panels: Sequence[tuple[str, str]]) -> bytes:
+    """Pictures of one size (heading, ``data:`` address) side by side, as one PNG."""
     from matplotlib.figure import Figure  # slow to import, and few reports have a strip
     from PIL import Image
 

@@ -9,7 +9,7 @@ import base64
 import io
 import math
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 from matplotlib import rc_context
@@ -170,27 +170,9 @@ def _dimension(ax: Axes, a: tuple[float, float], b: tuple[float, float], text: s
     """A line with arrows at both ends and its length in mm."""
     style = {"arrowstyle": "<|-|>", "color": _INK, "lw": 0.8, "shrinkA": 0, "shrinkB": 0}
     ax.annotate("", xy=a, xytext=b, arrowprops=style, zorder=6, annotation_clip=False)
-    lying = a[1] == b[1]
-    ax.text(
-        (a[0] + b[0]) / 2,
-        (a[1] + b[1]) / 2,
-        f"{text} mm",
-        rotation=0 if lying else 90,
-        ha="center",
-        va="center",
-        fontsize=11,
-        color=_INK,
-        zorder=7,
-        bbox=_UNDER_TEXT,
-    )
-
-
-@dataclass(frozen=True)
-class DensityScale:
-    """Ends of the colours of apparent density, kg/m3."""
-
-    low_kg_m3: float
-    high_kg_m3: float
+    middle, rotation = ((a[0] + b[0]) / 2, (a[1] + b[1]) / 2), 0 if a[1] == b[1] else 90
+    centred: dict[str, Any] = {"ha": "center", "va": "center", "fontsize": 11, "color": _INK}
+    ax.text(*middle, f"{text} mm", rotation=rotation, zorder=7, bbox=_UNDER_TEXT, **centred)
 
 
 def draw_layers(
@@ -210,15 +192,16 @@ def draw_layers(
 
 def draw_densities(
     snapshots: Sequence[Snapshot], scenario: Scenario, height_m: float
-) -> tuple[tuple[str, ...], DensityScale, tuple[float, ...]]:
+) -> tuple[tuple[str, ...], tuple[float, float], tuple[float, ...]]:
     """Draw each snapshot with its grains coloured by apparent density, on one scale.
 
     Returns
     -------
     tuple of str
         PNG as ``data:`` addresses.
-    DensityScale
-        From the 5th to the 98th percentile of all grains: the loose surface would dim the rest.
+    (float, float), kg/m3
+        Ends of the colours: the 5th and the 98th percentile of all grains, since the loose surface
+        would dim the rest.
     tuple of float, kg/m3
         Median of each snapshot.
     """
@@ -232,21 +215,15 @@ def draw_densities(
         np.concatenate([f[np.isfinite(f)] for f in density_kg_m3]) if density_kg_m3 else np.zeros(0)
     )
     low, high = (0.0, 1.0) if not len(finite) else np.percentile(finite, [5.0, 98.0]).tolist()
+    style: dict[str, Any] = {"cmap": "viridis", "limits": (low, high), "cut_m": cut_m(scenario)}
     value = {id(s): f for s, f in zip(snapshots, density_kg_m3, strict=True)}
 
     def densities(ax: Axes, snapshot: Snapshot) -> None:
-        draw_grains(
-            snapshot,
-            ax,
-            value[id(snapshot)],
-            cmap="viridis",
-            limits=(low, high),
-            cut_m=cut_m(scenario),
-        )
+        draw_grains(snapshot, ax, value[id(snapshot)], **style)
 
     pictures = tuple(panel(s, scenario, height_m, densities) for s in snapshots)
     medians = tuple(float(np.nanmedian(f)) if len(f) else math.nan for f in density_kg_m3)
-    return pictures, DensityScale(low, high), medians
+    return pictures, (low, high), medians
 
 
 def panel(
@@ -284,12 +261,7 @@ def _scale_bar(ax: Axes, width: float, height: float) -> None:
 
 def png(figure: Figure, has_scales: bool = False) -> str:
     """A figure as a PNG of few colours, a ``data:`` address; with scales of colours it has all."""
-    return picture_address(png_bytes(figure, has_scales))
-
-
-def picture_address(content: bytes) -> str:
-    """A PNG as a ``data:`` address."""
-    return _address("image/png", content)
+    return _address("image/png", png_bytes(figure, has_scales))
 
 
 def png_bytes(figure: Figure, has_scales: bool = False) -> bytes:

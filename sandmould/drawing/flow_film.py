@@ -11,14 +11,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from sandmould.drawing.animation import (
-    ABSENT,
-    PackedFilm,
-    changes,
-    encoded,
-    split_bytes,
-    within_budget,
-)
+from sandmould.drawing import animation
 
 Array = NDArray[np.float64]
 MOST_FRAMES = 150
@@ -27,28 +20,25 @@ LEVELS = 4095
 SHADES = 255
 
 
-@dataclass(frozen=True)
-class FlowFilm(PackedFilm):
-    """Frames of one run as the page reads them."""
+@dataclass(frozen=True, kw_only=True)
+class FlowFilm(animation.PackedFilm):
+    """Particles.
 
-    run: str
-    label: str
+    ``data`` has coordinates by axis, frame and particle, then shades of pressure and of speed by
+    frame and particle (uint8).
+    """
+
     dimension: int
     particles: int
-    time_s: tuple[float, ...]
     low_m: tuple[float, ...]
     high_m: tuple[float, ...]
     """Corners of what is shown: the mould with its walls."""
-    quantum_m: float
     particle_m: float
     wall_m: tuple[tuple[float, float], ...]
     """Walls across and up."""
     highest_pa: float
     """Full shade of the pressure, and below of the speed."""
     highest_m_s: float
-    data: str
-    """Base64 of deflated bytes: coordinates by axis, frame and particle, then shades of pressure
-    and of speed by frame and particle (uint8)."""
 
 
 def make_flow_film(
@@ -56,7 +46,7 @@ def make_flow_film(
 ) -> FlowFilm:
     """Pack the records of a run; records are left out to keep the budget, particles never."""
     total = len(fields["time_s"])
-    return within_budget(
+    return animation.within_budget(
         lambda chosen: _pack(fields, chosen, run, label, highest_pa),
         total, min(total, MOST_FRAMES), budget_bytes,
     )  # fmt: skip
@@ -77,19 +67,20 @@ def _pack(
     speed = np.linalg.norm(fields["velocity_m_s"], axis=1)
     # the few that splash may be far faster than the rest
     highest_m_s = float(np.nanquantile(speed, 0.99)) or 1.0
-    place = np.full((d, len(chosen), most), ABSENT, dtype=np.uint16)
+    place = np.full((d, len(chosen), most), animation.ABSENT, dtype=np.uint16)
     shade = np.zeros((2, len(chosen), most), dtype=np.uint8)
     for number, record in enumerate(chosen):
         own = slice(int(ends[record] - fields["count"][record]), int(ends[record]))
         count = int(fields["count"][record])
         steps = np.rint((fields["position_m"][own] - low_m) / quantum_m)
-        seen = (steps >= 0).all(axis=1) & (steps < ABSENT).all(axis=1)  # not what flew out, or NaN
-        place[:, number, :count] = np.where(seen, steps.T, ABSENT)
+        # not what flew out, or NaN
+        seen = (steps >= 0).all(axis=1) & (steps < animation.ABSENT).all(axis=1)
+        place[:, number, :count] = np.where(seen, steps.T, animation.ABSENT)
         for k, share in enumerate(
             (fields["pressure_pa"][own] / highest_pa, speed[own] / highest_m_s)
         ):
             shade[k, number, :count] = np.rint(SHADES * np.clip(np.nan_to_num(share), 0.0, 1.0))
-    raw = split_bytes(changes(place)) + shade.tobytes()
+    raw = animation.split_bytes(animation.changes(place)) + shade.tobytes()
     near = wall if d == 2 else wall[(wall[:, 1] > 0.0) & (wall[:, 1] <= size_m)]
     return FlowFilm(
         run=run,
@@ -104,5 +95,5 @@ def _pack(
         wall_m=tuple(map(tuple, np.round(near[:, [0, -1]].astype(float), 6).tolist())),
         highest_pa=highest_pa,
         highest_m_s=highest_m_s,
-        data=encoded(raw),
+        data=animation.encoded(raw),
     )

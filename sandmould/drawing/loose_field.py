@@ -27,12 +27,8 @@ def draw_loose_field(
 ) -> str:
     """Draw a field in the plane of the other pictures and outlines of zones: a ``data:`` address.
 
-    Parameters
-    ----------
-    field : LooseField
-    zones : sequence of int
-        Those that are outlined, as seen along y, and numbered from 1: in full where the plane cuts
-        them, else dashed.
+    ``zones`` are outlined as seen along y, and numbered from 1: in full where the plane cuts them,
+    else dashed.
     """
     # a plane is cut as a slice of one row
     share, of_zone = (a if a.ndim == 3 else a[:, None] for a in (field.share, field.zone))

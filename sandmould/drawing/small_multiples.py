@@ -8,7 +8,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from sandmould.drawing.animation import evenly
-from sandmould.drawing.chart import NARROW, PLAIN, WIDE, Chart, Laid, Line, Range, lay_out
+from sandmould.drawing.chart import NARROW, PLAIN, WIDE, Chart, Laid, Line, Range, lay_out, thinned
 from sandmould.runs.formatting import number
 
 MOST_LINES = 4
@@ -21,18 +21,11 @@ _POINTS, _POINTS_BEHIND = 200, 50
 
 
 @dataclass(frozen=True)
-class SettingPanel:
-    """One setting before all others."""
-
-    title: str
-    laid: Laid
-
-
-@dataclass(frozen=True)
 class SmallMultiples:
     """Panels with the same axes, or one chart where all curves lie on each other."""
 
-    panels: tuple[SettingPanel, ...]
+    panels: tuple[tuple[str, Laid], ...]
+    """One setting before all others, with its label."""
     together: tuple[Laid, Laid] | None
     """The chart for a wide page and for a phone, without labels."""
     note: str
@@ -57,15 +50,12 @@ def small_multiples(chart: Chart) -> SmallMultiples | None:
         )
         return SmallMultiples((), (lay_out(bare, WIDE), lay_out(bare, NARROW)), note)
     shown = [means[place] for place in evenly(len(means), MOST_PANELS).tolist()]
-    behind = tuple(
-        replace(line, xy=_thinned(line, _POINTS_BEHIND), tint=PLAIN, style="behind", label="")
-        for line in shown
-    )
+    few = ((line, thinned(line.xy, len(line.xy) // _POINTS_BEHIND)) for line in shown)
+    behind = tuple(replace(line, xy=xy, tint=PLAIN, style="behind", label="") for line, xy in few)
     whole = lay_out(chart, PANEL)
     frame = (whole.x.low, whole.x.high), (whole.y.low, whole.y.high)
     panels = tuple(
-        SettingPanel(mean.group, lay_out(_alone(chart, mean, behind, frame), PANEL))
-        for mean in shown
+        (mean.group, lay_out(_alone(chart, mean, behind, frame), PANEL)) for mean in shown
     )
     left_out = len(means) - len(shown)
     note = f"Shown are {len(shown)} of {len(means)} settings." if left_out else ""
@@ -92,11 +82,6 @@ def _alone(chart: Chart, mean: Line, behind: Sequence[Line], frame: tuple[Range,
     at_end = f"; it ends at {ends[-1, 1]:.4g}" if len(ends) else ""
     alt = f"{chart.y_title} against {chart.x_title}: {mean.title} before all others{at_end}."
     areas = tuple(area for area in chart.areas if area.group == mean.group)
-    front = (replace(line, xy=_thinned(line, _POINTS), label="") for line in own)
+    front = (replace(line, xy=thinned(line.xy, len(line.xy) // _POINTS), label="") for line in own)
     lines = (*behind, *front)
     return replace(chart, x_title="", y_title="", alt=alt, lines=lines, areas=areas, frame=frame)
-
-
-def _thinned(line: Line, most: int) -> np.ndarray:
-    stride = max(1, len(line.xy) // most)
-    return np.concatenate([line.xy[:-1:stride], line.xy[-1:]])

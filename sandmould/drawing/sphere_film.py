@@ -10,6 +10,7 @@ from __future__ import annotations
 import json
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from functools import partial
 from typing import Any
 from urllib.parse import quote
 
@@ -17,18 +18,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from sandmould.analysis.density import apparent_density
-from sandmould.drawing.animation import (
-    ABSENT,
-    PackedFilm,
-    changes,
-    encoded,
-    evenly,
-    readings_at,
-    rounded,
-    split_bytes,
-    within_budget,
-)
-from sandmould.drawing.figures import DensityScale
+from sandmould.drawing import animation
 from sandmould.engines.snapshot import Snapshot, scene_at
 from sandmould.kinds.sand.moments import Moment
 from sandmould.scenario.scenario import Scenario
@@ -47,56 +37,31 @@ UNKNOWN = 255
 """Shade of a grain whose density is not known."""
 
 
-@dataclass(frozen=True)
-class SphereFilm(PackedFilm):
-    """Frames of one run as the page reads them; coordinates are the box's own, in m."""
+@dataclass(frozen=True, kw_only=True)
+class SphereFilm(animation.GrainFilm):
+    """Spheres; of no grain unless given, for a view of solids alone.
 
-    run: str
-    label: str
-    grains: int
-    of_grains: int
+    ``data`` has coordinates by axis, frame and point; radii of the grains (uint16, shares of the
+    largest, low bytes first); their layers (uint8); shades of density and of speed by frame and
+    grain (uint8).
+    """
+
+    of_grains: int = 0
     """Grains of the run; fewer are shown where the film is light."""
-    vertices: int
+    vertices: int = 0
     """Points after the grains: vertices of the pattern that bends, 0 without one."""
-    time_s: tuple[float, ...]
-    vibration_time_s: tuple[float | None, ...]
-    """None before the first vibration."""
-    stage: tuple[str, ...]
-    is_filling: tuple[bool, ...]
-    reading: tuple[float | None, ...]
-    """The objective at each frame, if known."""
-    origin_m: tuple[float, ...]
-    quantum_m: float
-    largest_radius_m: float
-    slice_m: tuple[float, float] | None
+    is_filling: tuple[bool, ...] = (False,)
+    slice_m: tuple[float, float] | None = None
     """Least and greatest y of the grains that are shown, where not all are."""
-    density_kg_m3: tuple[float, float]
+    density_kg_m3: tuple[float, float] = (0.0, 1.0)
     """Densities of shades 0 and 254."""
-    fastest_m_s: float
+    fastest_m_s: float = 1.0
     """Speed of shade 254 and above."""
-    data: str
-    """Base64 of deflated bytes: coordinates by axis, frame and point; radii of the grains (uint16,
-    shares of the largest, low bytes first); their layers (uint8); shades of density and of speed
-    by frame and grain (uint8)."""
+    data: str = animation.encoded(b"")
     beside: str = ""
     """Address of the script with all grains and frames; empty where this film has them."""
     beside_bytes: int = 0
     beside_frames: int = 0
-
-    @property
-    def script(self) -> str:
-        """The film as a script that hands itself to the page."""
-        return f"sphereFilmArrived({json.dumps(self.values, separators=(',', ':'))});\n"
-
-
-def bare_film(run: str) -> SphereFilm:
-    """A film of no grain, for a view of solids alone."""
-    return SphereFilm(
-        run=run, label="", grains=0, of_grains=0, vertices=0, time_s=(0.0,),
-        vibration_time_s=(None,), stage=("",), is_filling=(False,), reading=(None,),
-        origin_m=(0.0, 0.0, 0.0), quantum_m=1.0, largest_radius_m=1.0, slice_m=None,
-        density_kg_m3=(0.0, 1.0), fastest_m_s=1.0, data=encoded(b""),
-    )  # fmt: skip
 
 
 @dataclass(frozen=True)
@@ -113,17 +78,12 @@ class SphereFrames:
     """All but the data."""
 
     def packed(self, grains: NDArray[np.int64], frames: Sequence[int]) -> SphereFilm:
-        """Pack some of the grains at some of the frames.
-
-        Parameters
-        ----------
-        grains : (k,) int64
-        """
+        """Pack some of the grains at some of the frames."""
         points = np.append(grains, np.arange(len(self.radius_m), self.place.shape[2]))
         share = np.rint(self.radius_m[grains] / self.film.largest_radius_m * 65535)
         raw = (
-            split_bytes(changes(self.place[:, frames][:, :, points]))
-            + split_bytes(share.astype(np.uint16))
+            animation.split_bytes(animation.changes(self.place[:, frames][:, :, points]))
+            + animation.split_bytes(share.astype(np.uint16))
             + self.layer[grains].tobytes()
             + self.shade[:, frames][:, :, grains].tobytes()
         )
@@ -131,31 +91,22 @@ class SphereFrames:
         chosen: dict[str, Any] = {
             name: tuple(getattr(self.film, name)[i] for i in frames) for name in of_frames
         }
-        return replace(self.film, **chosen, grains=len(grains), data=encoded(raw))
+        return replace(self.film, **chosen, grains=len(grains), data=animation.encoded(raw))
 
     @property
     def whole(self) -> SphereFilm:
         """All grains at all frames, packed."""
         return self.packed(np.arange(len(self.radius_m)), range(self.place.shape[1]))
 
-    def planned(self, of_grains: int, slice_m: tuple[float, float] | None) -> SphereFilm:
-        """All that was drawn of a scene, perhaps a slice of it only."""
-        return replace(self.whole, of_grains=of_grains, slice_m=slice_m)
-
     def light(self, cut_m: float, budget_bytes: int) -> SphereFilm:
         """Pack what a page can hold: frames are left out, and grains far behind the cut.
 
-        Parameters
-        ----------
-        cut_m : float, m
-            y of the plane behind which grains are shown first.
-        budget_bytes : int
-            Most that ``data`` may weigh; two frames are kept whatever they weigh.
+        ``cut_m``: y of the plane behind which grains are shown first.
         """
         grains, slice_m = self._behind(cut_m)
         total = self.place.shape[1]
         count = max(2, min(total, budget_bytes // max(1, 4 * len(grains))))
-        film = within_budget(lambda frames: self.packed(grains, frames), total, count, budget_bytes)
+        film = animation.within_budget(partial(self.packed, grains), total, count, budget_bytes)
         return replace(film, slice_m=slice_m)
 
     def inside_and_beside(
@@ -163,21 +114,14 @@ class SphereFrames:
     ) -> tuple[SphereFilm, dict[str, str]]:
         """The film for the page, and the script that lies beside it, by file name.
 
-        Parameters
-        ----------
-        folder_href : str
-            Address of the folder of scripts, seen from the page.
-
-        Returns
-        -------
-        SphereFilm
-        dict of str to str
-            Empty where the page holds all there is.
+        No script where the page holds all there is; ``folder_href``: its folder, seen from there.
         """
         light, total = self.light(cut_m, budget_bytes), self.place.shape[1]
         if light.slice_m is None and len(light.time_s) == total:
             return light, {}
-        name, script = f"{self.film.run}.js", self.whole.script
+        name = f"{self.film.run}.js"
+        # the film as a script that hands itself to the page
+        script = f"sphereFilmArrived({json.dumps(self.whole.values, separators=(',', ':'))});\n"
         href = f"{folder_href}{quote(name)}"
         inside = replace(light, beside=href, beside_bytes=len(script), beside_frames=total)
         return inside, {name: script}
@@ -188,12 +132,12 @@ class SphereFrames:
         if n <= MOST_INSIDE:
             return np.arange(n), None
         y = self.film.origin_m[1] + self.film.quantum_m * self.place[1, -1, :n]
-        nearest = np.where(self.place[1, -1, :n] == ABSENT, -np.inf, y) + self.radius_m
+        nearest = np.where(self.place[1, -1, :n] == animation.ABSENT, -np.inf, y) + self.radius_m
         # as many as the page holds from the plane on; some before it where it lies far back
         order = np.argsort(nearest, kind="stable")
         first = min(int(np.searchsorted(nearest[order], cut_m)), n - MOST_INSIDE)
         chosen = np.sort(order[first : first + MOST_INSIDE])
-        here = self.place[1, -1, chosen] != ABSENT
+        here = self.place[1, -1, chosen] != animation.ABSENT
         return chosen, (float(y[chosen][here].min()), float(y[chosen][here].max()))
 
 
@@ -202,27 +146,20 @@ def sphere_frames(
     scenario: Scenario,
     run: str,
     label: str,
-    scale: DensityScale,
+    scale: tuple[float, float],
     reading: tuple[Array, Array] | None = None,
 ) -> SphereFrames:
     """Quantise and shade all grains of a run.
 
-    Parameters
-    ----------
-    snapshots : sequence of Snapshot or Moment
-        At least one, in order of time; moments are read one at a time. Thinned so that all grains
-        fit beside the page.
-    run, label : str
-        Name of the run, and how the page calls it.
-    scale : DensityScale
-        Ends of the shades of density.
+    ``snapshots``: at least one, in order of time, thinned so that all grains fit beside the page;
+    moments are read one at a time.
     """
     most = max(2, min(MOST_FRAMES, MOST_BESIDE // max(1, len(_read(snapshots[-1]).id))))
-    chosen = [snapshots[i] for i in evenly(len(snapshots), most).tolist()]
+    chosen = [snapshots[i] for i in animation.evenly(len(snapshots), most).tolist()]
     ids, low_m, high_m, vertices = _extent(chosen)
     quantum_m = float((high_m - low_m).max()) / LEVELS or 1e-6
     n, total = len(ids), len(chosen)
-    place = np.full((3, total, n + vertices), ABSENT, dtype=np.uint16)
+    place = np.full((3, total, n + vertices), animation.ABSENT, dtype=np.uint16)
     density, speed = np.full((total, n), np.nan), np.zeros((total, n))
     radius_m, layer = np.zeros(n), np.zeros(n, dtype=np.uint8)
     clock: list[tuple[float, float, str]] = []
@@ -230,8 +167,8 @@ def sphere_frames(
         frame = _read(each)
         row = np.searchsorted(ids, frame.id)
         place[:, number, row] = np.rint((frame.position_m - low_m) / quantum_m).T
-        if vertices:
-            place[:, number, n:] = np.rint((_bent(frame) - low_m) / quantum_m).T
+        if vertices and frame.pattern_m is not None:
+            place[:, number, n:] = np.rint((frame.pattern_m - low_m) / quantum_m).T
         radius_m[row], layer[row] = frame.radius_m, np.minimum(frame.layer, 255)
         speed[number, row] = np.linalg.norm(frame.velocity_m_s, axis=1)
         density[number, row] = apparent_density(
@@ -243,7 +180,7 @@ def sphere_frames(
         clock.append((frame.time_s, frame.vibration_time_s, frame.stage))
     time_s = np.array([time for time, _, _ in clock])
     filling = tuple(is_filling(stage) for _, _, stage in clock)
-    fastest_m_s = _fastest(speed, place[0, :, :n] != ABSENT, np.array(filling))
+    fastest_m_s = _fastest(speed, place[0, :, :n] != animation.ABSENT, np.array(filling))
     film = SphereFilm(
         run=run,
         label=label,
@@ -251,30 +188,23 @@ def sphere_frames(
         of_grains=n,
         vertices=vertices,
         time_s=tuple(time_s.round(6).tolist()),
-        vibration_time_s=rounded(shaken_s for _, shaken_s, _ in clock),
+        vibration_time_s=animation.rounded(shaken_s for _, shaken_s, _ in clock),
         stage=tuple(stage for _, _, stage in clock),
         is_filling=filling,
-        reading=readings_at(time_s, reading),
+        reading=animation.readings_at(time_s, reading),
         origin_m=tuple(low_m.tolist()),
         quantum_m=quantum_m,
         largest_radius_m=float(radius_m.max(initial=0.0)) or 1.0,
-        slice_m=None,
-        density_kg_m3=(scale.low_kg_m3, scale.high_kg_m3),
+        density_kg_m3=scale,
         fastest_m_s=fastest_m_s,
-        data="",
     )
-    span = (scale.high_kg_m3 - scale.low_kg_m3) or 1.0
-    shares = ((density - scale.low_kg_m3) / span, speed / fastest_m_s)
+    span = (scale[1] - scale[0]) or 1.0
+    shares = ((density - scale[0]) / span, speed / fastest_m_s)
     return SphereFrames(place, radius_m, layer, np.stack([_shade(s) for s in shares]), film)
 
 
 def _read(snapshot: Snapshot | Moment) -> Snapshot:
     return snapshot.load() if isinstance(snapshot, Moment) else snapshot
-
-
-def _bent(frame: Snapshot) -> Array:
-    assert frame.pattern_m is not None
-    return frame.pattern_m
 
 
 def _extent(

@@ -65,15 +65,7 @@ class SurfaceField:
 def sphere_scene(
     scenario: Scenario, top_m: float, fields: Sequence[SurfaceField] = ()
 ) -> dict[str, object]:
-    """The scene for the page's 3D view, in m.
-
-    Parameters
-    ----------
-    scenario : Scenario
-        In three dimensions.
-    fields : sequence of SurfaceField, optional
-        By which the solids can be coloured.
-    """
+    """The scene for the page's 3D view, in m; its solids can be coloured by fields."""
     box, pattern = scenario.box, scenario.pattern
     gate = scenario.gate.name if scenario.gate else None
     bends = "" if pattern is None else pattern.name
@@ -86,22 +78,18 @@ def sphere_scene(
         }
         for solid in scenario.scene.solids
     ]
-    bores = [np.round(lines_m, 6).ravel().tolist() for lines_m in _cavity_lines(scenario)]
+    lines = [_bore_lines(bore) for bore in scenario.scene.bores]
+    for cavity in scenario.scene.cavities:
+        vertices_m, triangles = _triangles(cavity.space)
+        lines.append(vertices_m[sharp_edges(vertices_m, triangles)])
+    bores = [np.round(lines_m, 6).ravel().tolist() for lines_m in lines]
     return _scene((box.width_m, box.depth_m, top_m), cut_m(scenario), solids, bores, fields)
 
 
 def solid_scene(
     solids: Iterable[Body], low_m: Array, high_m: Array, fields: Sequence[SurfaceField] = ()
 ) -> dict[str, object]:
-    """Solids in a box without sand, for the same view.
-
-    Parameters
-    ----------
-    solids : iterable of Body
-        Blocks and meshes.
-    low_m, high_m : (3,) float64, m
-        Corners of the box, which need not be at the origin.
-    """
+    """Blocks and meshes in a box without sand, which need not be at the origin; the same view."""
     moved = [replace(field, place_m=field.place_m - low_m) for field in fields]
     packed = []
     for solid in solids:
@@ -209,16 +197,6 @@ def sharp_edges(vertices_m: Array, triangles: NDArray[np.int64]) -> NDArray[np.i
     flat = mesh.face_adjacency_edges[mesh.face_adjacency_angles < _SHARP_RAD]
     edges = trimesh.grouping.boolean_rows(mesh.edges_unique, flat, np.setdiff1d)
     return np.asarray(edges, dtype=np.int64)
-
-
-def _cavity_lines(scenario: Scenario) -> list[Array]:
-    """Ends of the lines along the edges of each tube's bore and of each cavity."""
-    scene = scenario.scene
-    lines = [_bore_lines(bore) for bore in scene.bores]
-    for cavity in scene.cavities:
-        vertices_m, triangles = _triangles(cavity.space)
-        lines.append(vertices_m[sharp_edges(vertices_m, triangles)])
-    return lines
 
 
 def _bore_lines(bore: Bore) -> Array:

@@ -24,33 +24,20 @@ MOST_RUNS = 600
 def drawn_part(collected: Collected, verdict: Verdict) -> tuple[Collected, Verdict]:
     """What charts show: everything, or settings evenly over the sweep with the two best.
 
-    Parameters
-    ----------
-    collected : Collected
-        Runs that the verdict was made from.
-
-    Returns
-    -------
-    (Collected, Verdict)
-        Means, intervals and comparisons are those of all runs.
+    Means, intervals and comparisons are those of all runs.
     """
     summary, settings = collected.summary, verdict.settings
     if len(settings) <= MOST_SETTINGS and len(summary) <= MOST_RUNS:
         return collected, verdict
-    chosen = _evenly(verdict)
+    # over the whole sweep in its order, the two best among them
+    labels = {settings[place].label for place in evenly(len(settings), MOST_SETTINGS - 2).tolist()}
+    labels |= {s.label for s in (verdict.best, verdict.runner_up) if s is not None}
+    chosen = tuple(s for s in settings if s.label in labels)
     each = max(1, MOST_RUNS // len(chosen))
     rows = {setting_text(at): own[:each] for at, own in setting_rows(summary, collected.keys)}
     drawn = summary.iloc[np.concatenate([rows[setting.label] for setting in chosen])]
     curves = collected.curves[collected.curves[RUN].isin(set(drawn[RUN]))]
     return replace(collected, summary=drawn, curves=curves), replace(verdict, settings=chosen)
-
-
-def _evenly(verdict: Verdict) -> tuple[Setting, ...]:
-    """Settings over the whole sweep in its order, the two best among them."""
-    settings = verdict.settings
-    labels = {settings[place].label for place in evenly(len(settings), MOST_SETTINGS - 2).tolist()}
-    labels |= {s.label for s in (verdict.best, verdict.runner_up) if s is not None}
-    return tuple(s for s in settings if s.label in labels)
 
 
 def drawn_note(collected: Collected, verdict: Verdict) -> str:

@@ -81,11 +81,9 @@ def _engine(name: EngineName) -> InstallationPart:
 
 def _kernels() -> InstallationPart:
     folder = cache_folder()
-    if any(folder.glob("**/*.nbi")):
-        return InstallationPart("compiled loops", f"kept in {folder}")
-    return InstallationPart(
-        "compiled loops", f"none yet; the first study compiles them into {folder}"
-    )
+    none = f"none yet; the first study compiles them into {folder}"
+    said = f"kept in {folder}" if any(folder.glob("**/*.nbi")) else none
+    return InstallationPart("compiled loops", said)
 
 
 def _slurm() -> InstallationPart:
@@ -101,10 +99,8 @@ def _disk(folder: Path) -> InstallationPart:
     said = f"{size_text(free)} free in {place.absolute()}"
     if not os.access(place, os.W_OK):
         return InstallationPart("disk", said, "work in a folder that you may write to")
-    few = free < SMALLEST_DISK_BYTES
-    return InstallationPart(
-        "disk", said, "free some: a study can take a few hundred MB" if few else ""
-    )
+    wrong = "free some: a study can take a few hundred MB" if free < SMALLEST_DISK_BYTES else ""
+    return InstallationPart("disk", said, wrong)
 
 
 def doctor_text(found: list[InstallationPart]) -> str:

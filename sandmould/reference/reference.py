@@ -1,7 +1,4 @@
-"""Pages of the documentation that are written from the code: measures, limits, keys and files.
-
-``python -m sandmould.reference.reference`` writes them again.
-"""
+"""Pages of the documentation that are written from the code: measures, limits, keys and files."""
 
 from __future__ import annotations
 
@@ -12,7 +9,6 @@ from typing import Any
 from sandmould import ROOT
 from sandmould.kinds.registry import KINDS, kind_named
 from sandmould.limits import LIMITS
-from sandmould.module_main import run_main
 from sandmould.reference.contents import OF_ALL, OF_RUN, OF_STUDY
 from sandmould.reference.keys import cells, keys_of, kind_of, sections
 from sandmould.study.plan.expand import scenes
@@ -73,13 +69,3 @@ def pages() -> dict[Path, str]:
         "files": {"places": places, "tables": [f for f in (*OF_STUDY, *OF_RUN) if f.columns]},
     }
     return {DOCS / f"{name}.md": page(name, **about) for name, about in values.items()}
-
-
-def main() -> None:
-    """Write the pages."""
-    for path, text in pages().items():
-        path.write_text(text, encoding="utf-8")
-
-
-if __name__ == "__main__":
-    run_main(main, "python -m sandmould.reference.reference")

@@ -10,7 +10,7 @@ import pandas as pd
 
 from sandmould.definition.study import Study
 from sandmould.drawing.chart import PLAIN, Chart, Mark, Tint
-from sandmould.report.tables import Cell, Column, Table
+from sandmould.report.tables import Cell, Column, Table, cells, number_cell
 from sandmould.runs.formatting import listed, name_of, number, seconds, titled
 from sandmould.statistics.agreement import Compared, interval_text, speeds
 from sandmould.statistics.equivalence import PERCENT
@@ -70,46 +70,32 @@ def _table(compared: Sequence[Compared]) -> Table:
         *map(Column, ("first", "second", "difference", f"{PERCENT} interval", "margin", "n")),
         Column("verdict", False),
     )
-    rows, marked = [], []
+    rows = []
     for c in compared:
-        agreement = c.agreement
-        where = f"{c.pair}, {c.at}" if c.at else c.pair
-        cells = (*agreement.means, agreement.difference)
-        rows.append(
-            (
-                Cell(name_of(c.measure), c.measure),
-                Cell(where, where),
-                *(Cell(number(v, d), str(v)) for v, d in zip(cells, (4, 4, 2), strict=True)),
-                Cell(interval_text(agreement), str(agreement.ci[0])),
-                Cell(f"±{agreement.margin:g}", str(agreement.margin)),
-                Cell(f"{agreement.n}{' pairs' if agreement.paired else ''}", str(agreement.n)),
-                Cell(agreement.verdict, agreement.verdict, note=agreement.note),
-            )
-        )
-        marked.append(agreement.verdict != "equivalent")
-    return Table(columns, tuple(rows), tuple(marked))
+        of = c.agreement
+        what = Cell(name_of(c.measure), c.measure), f"{c.pair}, {c.at}" if c.at else c.pair
+        means = (*(number_cell(mean, 4) for mean in of.means), number_cell(of.difference, 2))
+        interval = Cell(interval_text(of), str(of.ci[0]))
+        margin = Cell(f"±{of.margin:g}", str(of.margin))
+        n = Cell(f"{of.n}{' pairs' if of.paired else ''}", str(of.n))
+        verdict = Cell(of.verdict, of.verdict, note=of.note)
+        rows.append(cells(*what, *means, interval, margin, n, verdict))
+    marked = tuple(c.agreement.verdict != "equivalent" for c in compared)
+    return Table(columns, tuple(rows), marked)
 
 
 def _chart(compared: Sequence[Compared]) -> Chart:
     """Intervals of one measure in rows, with the margins shaded."""
     margin = compared[0].agreement.margin
-    marks = [
-        Mark(
-            c.agreement.difference,
-            row,
-            "mean",
-            _TINTS.get(c.agreement.verdict, PLAIN),
-            (c.agreement.ci[1] - c.agreement.ci[0]) / 2,
-            f"{c.pair}: {number(c.agreement.difference, 2)}, {c.agreement.verdict}",
-        )
-        for row, c in enumerate(compared)
-        if math.isfinite(c.agreement.difference)
-    ]
-    said = [
-        f"{c.pair}{f' at {c.at}' if c.at else ''}: {number(c.agreement.difference, 2)}, "
-        f"{interval_text(c.agreement)}, {c.agreement.verdict}"
-        for c in compared
-    ]
+    marks, said = [], []
+    for row, c in enumerate(compared):
+        of, apart = c.agreement, number(c.agreement.difference, 2)
+        where = f"{c.pair}{f' at {c.at}' if c.at else ''}"
+        said.append(f"{where}: {apart}, {interval_text(of)}, {of.verdict}")
+        if math.isfinite(of.difference):
+            tint, reach = _TINTS.get(of.verdict, PLAIN), (of.ci[1] - of.ci[0]) / 2
+            title = f"{c.pair}: {apart}, {of.verdict}"
+            marks.append(Mark(of.difference, row, "mean", tint, reach, title))
     what = titled(compared[0].measure)
     return Chart(
         f"difference in {what}",
@@ -140,15 +126,9 @@ def _speed_table(summary: pd.DataFrame) -> Table | None:
                       "speed over the slowest")),
     )  # fmt: skip
     slowest = min(s.grain_steps_per_s for s in rows)
-    cells = tuple(
-        (
-            Cell(s.engine, s.engine),
-            Cell(s.version, s.version),
-            Cell(str(s.runs), str(s.runs)),
-            Cell(f"{number(s.grain_steps_per_s / 1e6)} M", str(s.grain_steps_per_s)),
-            Cell(seconds(s.wall_s), str(s.wall_s)),
-            Cell(number(s.grain_steps_per_s / slowest, 2), str(s.grain_steps_per_s)),
-        )
-        for s in rows
-    )
-    return Table(columns, cells, (False,) * len(cells))
+    shown = []
+    for s in rows:
+        speed = Cell(f"{number(s.grain_steps_per_s / 1e6)} M", str(s.grain_steps_per_s))
+        wall, over = Cell(seconds(s.wall_s), str(s.wall_s)), s.grain_steps_per_s / slowest
+        shown.append(cells(s.engine, s.version, str(s.runs), speed, wall, number_cell(over, 2)))
+    return Table(columns, tuple(shown), (False,) * len(shown))

@@ -3,15 +3,16 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
+import numpy as np
 import pandas as pd
 
-from sandmould.report.drive import drive_at
 from sandmould.report.optimum import TWO_SIDED, OptimumPages
 from sandmould.report.robustness import RobustnessPages
 from sandmould.report.tables import Cell, Column, KeyNumber, Table, share_of_what_fits
+from sandmould.runs.columns import finished
 from sandmould.runs.formatting import (
     display_scale,
     filled_space,
@@ -29,12 +30,12 @@ from sandmould.statistics.answer import Answer
 from sandmould.statistics.config import FULL_SHARE
 from sandmould.statistics.evidence import usable_values
 from sandmould.statistics.optimum import Optimum
-from sandmould.statistics.settings import Setting
 from sandmould.statistics.verdict import Verdict
 from sandmould.wording.answer import OF_DRIVE, AnswerWords, place_text
 from sandmould.wording.next_steps import NextSteps
 from sandmould.wording.robustness import recommendation_sentence
 
+_AMPLITUDES = (DISPLACEMENT, VELOCITY)
 MOST_CHOICES = 12
 """Settings that the first screen lists."""
 
@@ -84,7 +85,7 @@ def optimum_headline(
         name = "" if len(optimum.keys) == 1 and unit_of(key) else f"{name_of(key)} "
         at = f"{name}{value_text(key, float(f'{value:.3g}'))}"
         interval = f"95 %: {range_text(key, low, float(f'{high:.3g}'))}"
-        drive = _as_drive(drive_at(summary, optimum.keys, optimum.setting))
+        drive = drive_at(summary, optimum.keys, optimum.setting)
         places.append(place_text(at, optimum.keys, drive, interval))
     share = share_at(optimum, summary, answer.verdict.measure)
     said = worded(
@@ -93,6 +94,36 @@ def optimum_headline(
         is_vague=optimum.is_vague,
     )  # fmt: skip
     return said, pages.sound
+
+
+def drive_at(
+    summary: pd.DataFrame, keys: Sequence[str], setting: Mapping[str, float]
+) -> BoxDrive | None:
+    """The drive between the settings of a sweep; None where runs have none.
+
+    Over one key logarithms are interpolated between the means of its settings, which is exact for
+    an amplitude that is held. Over several keys it is the nearest setting's, each key over its
+    range.
+    """
+    if not all(column in summary for column in _AMPLITUDES):
+        return None
+    rows = summary[finished(summary)].dropna(subset=[*_AMPLITUDES, *keys])
+    if rows.empty:
+        return None
+    means = rows.groupby(list(keys))[list(_AMPLITUDES)].mean().reset_index()
+    at = means[list(keys)].to_numpy(dtype=np.float64)
+    wanted = np.array([setting[key] for key in keys])
+    values = means[list(_AMPLITUDES)].to_numpy(dtype=np.float64)
+    if len(keys) == 1 and (at > 0).all() and (values > 0).all():
+        x, log = np.log(wanted[0]), np.log(values)
+        found = np.exp([np.interp(x, np.log(at[:, 0]), log[:, i]) for i in range(len(_AMPLITUDES))])
+    else:
+        width = np.maximum(np.ptp(at, axis=0), np.finfo(float).tiny)
+        found = values[int((((at - wanted) / width) ** 2).sum(axis=1).argmin())]
+    displacement_m, velocity_m_s = found.tolist()
+    if not displacement_m > 0.0:
+        return None
+    return BoxDrive(velocity_m_s / displacement_m / (2 * math.pi), displacement_m)
 
 
 def share_at(optimum: Optimum, summary: pd.DataFrame, measure: str) -> float:
@@ -104,19 +135,25 @@ def share_at(optimum: Optimum, summary: pd.DataFrame, measure: str) -> float:
     return share_of_what_fits(summary, measure) * optimum.value[0] / mean
 
 
-def _as_drive(drive: Mapping[str, float] | None) -> BoxDrive | None:
-    """The motion that has these amplitudes."""
-    if drive is None or not drive[DISPLACEMENT] > 0.0:
-        return None
-    frequency_hz = drive[VELOCITY] / drive[DISPLACEMENT] / (2 * math.pi)
-    return BoxDrive(frequency_hz, drive[DISPLACEMENT])
-
-
 def figures_of(answer: Answer, summary: pd.DataFrame) -> tuple[KeyNumber, ...]:
     """The one setting that suits the question in words of the machine; nothing where several do."""
     if len(answer.wanted) != 1 or answer.beside:
         return ()
-    return _figures(answer.verdict.setting(answer.wanted[0]), answer, summary)
+    verdict, setting = answer.verdict, answer.verdict.setting(answer.wanted[0])
+    drive = answer.drives.get(setting.label)
+    figures = [] if drive is None else [KeyNumber(f"{number(drive.frequency_hz)} Hz", "frequency")]
+    figures += _motion_figures(drive)
+    figures += [
+        KeyNumber(value_text(key, value), name_of(key))
+        for key, value in setting.values.items()
+        if drive is None or key.rpartition(".")[2] not in OF_DRIVE
+    ]
+    share = share_of_what_fits(summary, verdict.measure, setting.values)
+    runs = f"mean of {setting.n} runs, ± its 95 % interval" if setting.n > 1 else "one run"
+    mean = AnswerWords(answer).value(setting.mean, setting.ci_half_width)
+    if math.isfinite(share):
+        figures.append(_share_figure(share, verdict.measure, "of what fits in"))
+    return (*figures, KeyNumber(mean, name_of(verdict.measure), runs))
 
 
 def table_of(answer: Answer) -> Table | None:
@@ -155,7 +192,6 @@ def optimum_choice(
     optimum, advised = pages.optimum, pages.recommendation
     if optimum is None or is_artefact or (advised is not None and advised.interval_hz is None):
         return ()
-    drive = _as_drive(drive_at(summary, optimum.keys, optimum.setting))
     of_keys = [
         KeyNumber(
             value_text(key, rounded(value)),
@@ -167,7 +203,7 @@ def optimum_choice(
     ]
     factor, what = display_scale(verdict.measure)
     mean, se = optimum.value
-    of_keys += _motion_figures(drive)
+    of_keys += _motion_figures(drive_at(summary, optimum.keys, optimum.setting))
     share = share_at(optimum, summary, verdict.measure)
     if math.isfinite(share):
         of_keys.append(_share_figure(share, verdict.measure, "of what fits in, about"))
@@ -183,24 +219,6 @@ def _share_figure(share: float, measure: str, label: str) -> KeyNumber:
     space = filled_space(measure).replace("_", " ")
     note = f"100 %: the sand in the {space} is as dense as that outside"
     return KeyNumber(f"{100 * share:.0f} %", label, note)
-
-
-def _figures(setting: Setting, answer: Answer, summary: pd.DataFrame) -> tuple[KeyNumber, ...]:
-    """What is set, how the box then moves, and what comes of it."""
-    verdict, drive = answer.verdict, answer.drives.get(setting.label)
-    figures = [] if drive is None else [KeyNumber(f"{number(drive.frequency_hz)} Hz", "frequency")]
-    figures += _motion_figures(drive)
-    figures += [
-        KeyNumber(value_text(key, value), name_of(key))
-        for key, value in setting.values.items()
-        if drive is None or key.rpartition(".")[2] not in OF_DRIVE
-    ]
-    share = share_of_what_fits(summary, verdict.measure, setting.values)
-    runs = f"mean of {setting.n} runs, ± its 95 % interval" if setting.n > 1 else "one run"
-    mean = AnswerWords(answer).value(setting.mean, setting.ci_half_width)
-    if math.isfinite(share):
-        figures.append(_share_figure(share, verdict.measure, "of what fits in"))
-    return (*figures, KeyNumber(mean, name_of(verdict.measure), runs))
 
 
 def _motion_figures(drive: BoxDrive | None) -> list[KeyNumber]:

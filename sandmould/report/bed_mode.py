@@ -60,12 +60,7 @@ def bed_mode(
 ) -> BedMode | None:
     """First mode of the beds of a study; None of a scene where nothing vibrates or presses.
 
-    Parameters
-    ----------
-    summary : DataFrame
-        One row a run; its beds' heights count, the expected one where it has none.
-    responses : sequence of Response
-        Of the small shakes.
+    Heights of beds in ``summary`` count, the expected one where it has none.
     """
     hardness = bed_hardness(scenario)
     if hardness is None or not scenario.vibrations:

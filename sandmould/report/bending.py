@@ -21,10 +21,10 @@ from sandmould.pattern_fe.coupling.loop_verdict import LoopVerdict, study_senten
 from sandmould.pattern_fe.quality import mesh_sentence
 from sandmould.pattern_fe.scene import pattern_of
 from sandmould.report.bending_figures import coupling_map, draw_distances, draw_outlines
-from sandmould.report.curves import runs_of, setting_tints, time_chart
-from sandmould.report.tables import Cell, Column, Table
+from sandmould.report.curves import runs_by_setting, setting_tints, time_chart
+from sandmould.report.tables import Cell, Column, Table, cells
 from sandmould.runs.columns import RUN, SOLID_FRACTION, TIME_S, VIBRATION_TIME_S
-from sandmould.runs.formatting import number, setting_text
+from sandmould.runs.formatting import setting_text
 from sandmould.runs.templates import sentences
 from sandmould.scenario.pattern import PatternDrawing
 from sandmould.scenario.scenario import Scenario
@@ -174,10 +174,7 @@ def paper_sentences(scenario: Scenario, collected: Collected, pictured_run: str)
 def deflection_chart(collected: Collected, verdict: Verdict) -> Chart | None:
     """Deflection of the tip over the whole run, clocks set to the start of vibration.
 
-    Returns
-    -------
-    Chart or None
-        Each run thin, the mean of each setting thick, between its least and greatest run an area.
+    Each run thin, the mean of each setting thick, between its least and greatest run an area.
     """
     drawn, part = drawn_part(collected, verdict)
     if TIP not in drawn.curves:
@@ -191,9 +188,9 @@ def deflection_chart(collected: Collected, verdict: Verdict) -> Chart | None:
     if chart is None:
         return None
     tint = setting_tints(part, collected.keys)
-    areas = []
+    areas, rows_of = [], runs_by_setting(drawn.summary, collected.keys)
     for setting in part.settings:
-        rows = runs_of(drawn.summary, setting)
+        rows = rows_of[setting.label]
         used = rows.loc[left_out(rows, TIP) == "", RUN]
         area = _area(aligned[aligned[RUN].isin(used)])
         if area is not None:
@@ -253,15 +250,10 @@ def _runs_table(
         run = str(planned[RUN])
         loop_verdict, measures = verdicts.get(run), last.get(run, pd.Series(dtype=np.float64))
         setting = setting_text({key: planned[key] for key in collected.keys})
-        rows.append(
-            (
-                Cell(run, run),
-                *([Cell(setting, setting)] if collected.keys else []),
-                _loop_cell(loop_verdict),
-                *(_value_cell(measures.get(name), factor) for _, name, factor, _ in _COLUMNS),
-                *(_file_cell(study_folder, href, run, suffix) for suffix in ("vtu", "stl")),
-            )
-        )
+        named = (run, setting) if collected.keys else (run,)
+        values = (factor * measures.get(name, math.nan) for _, name, factor, _ in _COLUMNS)
+        files = (_file_cell(study_folder, href, run, suffix) for suffix in ("vtu", "stl"))
+        rows.append(cells(*named, _loop_cell(loop_verdict), *values, *files))
         marked.append(loop_verdict is None or loop_verdict.state != "holds")
     return Table(columns, tuple(rows), tuple(marked))
 
@@ -271,11 +263,6 @@ def _loop_cell(verdict: LoopVerdict | None) -> Cell:
         return Cell("–", "")
     reason = verdict.sentence.split(": ", 1)[1]
     return Cell(verdict.state, verdict.state, note=reason[0].upper() + reason[1:])
-
-
-def _value_cell(value: Any, factor: float) -> Cell:
-    x = math.nan if value is None else factor * float(value)
-    return Cell(number(x), str(x))
 
 
 def _file_cell(study_folder: Path, href: str, run: str, suffix: str) -> Cell:

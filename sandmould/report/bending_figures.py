@@ -7,7 +7,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from pathlib import Path
 
 import meshio
@@ -47,17 +47,10 @@ _COLUMNS = 4
 _LINE = "0.25"
 
 
-@dataclass(frozen=True)
-class CouplingMap:
-    """The picture, and how many verdicts the prediction gets right."""
-
-    picture: str
-    """A ``data:`` address."""
-    sentence: str
-
-
-def coupling_map(collected: Collected, states: Mapping[str, State]) -> CouplingMap | None:
+def coupling_map(collected: Collected, states: Mapping[str, State]) -> dict[str, str] | None:
     """Draw verdicts and predicted limits, a panel for each setting of the other swept keys.
+
+    The picture's address, and how many verdicts the prediction gets right as a sentence.
 
     ``states``: of the runs that can be judged.
 
@@ -93,7 +86,7 @@ def coupling_map(collected: Collected, states: Mapping[str, State]) -> CouplingM
     for axes in grid[-1]:
         axes.set_xlabel("Young's modulus, Pa")
     figure.legend(handles=_legend(), loc="outside lower center", ncols=5, frameon=False)
-    return CouplingMap(png(figure), _prediction_sentence(rows))
+    return {"picture": png(figure), "sentence": _prediction_sentence(rows)}
 
 
 def _draw(axes: Axes, part: pd.DataFrame) -> None:
@@ -140,10 +133,7 @@ _STYLES = {"filled": ("after filling", "#D55E00"), "final": ("at the end", "#007
 def draw_outlines(run_folder: Path, scenario: Scenario) -> tuple[str, str]:
     """Draw the shapes of one run, in 3D cut through the middle; displacements are not magnified.
 
-    Returns
-    -------
-    (str, str)
-        PNG as a ``data:`` address and what it shows; both empty where the run left no shape.
+    PNG as a ``data:`` address and what it shows; both empty where the run left no shape.
     """
     pattern = scenario.pattern
     assert pattern is not None

@@ -24,7 +24,7 @@ from sandmould.analysis.freezing_plots import (
 from sandmould.casting.arpm.scene import solids_of
 from sandmould.drawing.figures import png
 from sandmould.drawing.sphere_scene import SurfaceField, solid_scene
-from sandmould.report.tables import Cell, Column, Table
+from sandmould.report.tables import Column, Table, cells, number_cell
 from sandmould.runs.formatting import number
 from sandmould.runs.templates import sentences
 from sandmould.scenario.casting.shapes import Body
@@ -159,7 +159,7 @@ def _spots(frozen: Freezing) -> Table:
     axes = [Column(f"{name}, mm") for name in "yz"[: frozen.hot_spots_m.shape[1] - 1]]
     columns = (Column("hot spot at x, mm"), *axes, Column("frozen after, s"))
     rows = tuple(
-        tuple(Cell(number(v, 4), str(v)) for v in (*(1e3 * place), time_s))
+        tuple(number_cell(v, 4) for v in (*(1e3 * place), time_s))
         for place, time_s in zip(frozen.hot_spots_m, frozen.hot_spot_s, strict=True)
     )
     return Table(columns, rows, (False,) * len(rows))
@@ -178,24 +178,15 @@ def _cut_off(fed: Feeding, dimensions: int, has_risers: bool) -> Table:
         Column(f"path to {'the nearest riser' if has_risers else 'what flows last'}, mm"),
     )
 
-    def place(at_m: NDArray[np.float64]) -> Cell:
-        text = ", ".join(number(1e3 * v) for v in at_m) if np.isfinite(at_m).all() else "-"
-        return Cell(text, text)
-
-    rows = tuple(
-        (
-            place(it.region.low_m),
-            place(it.region.high_m),
-            *(
-                Cell(number(v), str(v))
-                for v in (factor * it.region.volume_m3, it.cut_off_s, it.solid_s)
-            ),
-            place(it.throat_m),
-            Cell(number(1e3 * it.path_m), str(it.path_m)),
+    rows = []
+    for it in fed.cut_off:
+        low, high, throat = (
+            ", ".join(number(1e3 * v) for v in at_m) if np.isfinite(at_m).all() else "-"
+            for at_m in (it.region.low_m, it.region.high_m, it.throat_m)
         )
-        for it in fed.cut_off
-    )
-    return Table(columns, rows, (False,) * len(rows))
+        values = factor * it.region.volume_m3, it.cut_off_s, it.solid_s
+        rows.append(cells(low, high, *values, throat, 1e3 * it.path_m))
+    return Table(columns, tuple(rows), (False,) * len(rows))
 
 
 def distance_from(solids: Sequence[Body]) -> DistanceM:

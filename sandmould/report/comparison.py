@@ -16,7 +16,7 @@ from sandmould.bad_input import BadInputError, Problem
 from sandmould.definition.study import Study
 from sandmould.definition.sweep import value_at
 from sandmould.drawing.chart import NARROW, WIDE, Chart, Line, Mark, lay_out, tints
-from sandmould.drawing.templates import page_environment
+from sandmould.drawing.figure_files import page_environment
 from sandmould.report.tables import Cell, Column, Table
 from sandmould.runs.files import write_text
 from sandmould.runs.formatting import (

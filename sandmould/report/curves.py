@@ -1,17 +1,24 @@
-"""Charts of a study: a measure against time of every run, the objective against the settings."""
+"""Charts of a study: a measure against time of every run, the objective against the settings.
+
+And which runs are looked at besides.
+"""
 
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import replace
+from pathlib import Path
 
 import numpy as np
 import pandas as pd
 from numpy.typing import NDArray
 
 from sandmould.definition.study import Study
-from sandmould.drawing.chart import PLAIN, Chart, Line, Mark, Tint, tints
+from sandmould.drawing.chart import PLAIN, Chart, Line, Mark, Tint, thinned, tints
+from sandmould.drawing.figure_files import numbered
+from sandmould.drawing.thinning import drawn_part
+from sandmould.kinds.sand.moments import list_moments
 from sandmould.runs.columns import OUTCOME, RUN, TIME_S, VIBRATION_TIME_S, during_vibration
 from sandmould.runs.formatting import (
     display_scale,
@@ -26,7 +33,8 @@ from sandmould.runs.formatting import (
 )
 from sandmould.statistics.evidence import left_out, shown_values, usable_values
 from sandmould.statistics.settings import WIDE_KEY, Setting, group_settings, spans
-from sandmould.statistics.verdict import FEW, Verdict, compare_settings
+from sandmould.statistics.verdict import FEW, Verdict, compare_settings, rank_runs
+from sandmould.study.collect import Collected
 from sandmould.wording.answer import why_unused
 
 _POINTS = 12_000
@@ -69,17 +77,32 @@ def are_on_a_scale(verdict: Verdict, keys: Sequence[str]) -> bool:
     return len(keys) == 1 and len(values) > 1 and numbers
 
 
-def runs_of(summary: pd.DataFrame, setting: Setting) -> pd.DataFrame:
-    """Rows of the summary at one setting."""
-    chosen = pd.Series(True, index=summary.index)
-    for key, value in setting.values.items():
-        chosen &= summary[key].isna() if pd.isna(value) else summary[key] == value
-    return summary[chosen]
-
-
 def runs_by_setting(summary: pd.DataFrame, keys: Sequence[str]) -> dict[str, pd.DataFrame]:
     """Rows of the summary at every setting, by its label."""
     return {setting_text(values): rows for values, rows in group_settings(summary, keys)}
+
+
+def pictured_runs(study_folder: Path, summary: pd.DataFrame, verdict: Verdict) -> dict[str, str]:
+    """Runs to be looked at, by role: of the best setting, median and worst, or what there is.
+
+    Of the best setting it is the run in the middle, not the luckiest. Where one run can be used it
+    is the only one. Where none can, that with most snapshots stands alone: to see how it failed.
+    """
+    ranks = rank_runs(summary, verdict.measure, verdict.better)
+    if "best" in ranks and verdict.best is not None:
+        rows = runs_by_setting(summary, list(verdict.best.values))[verdict.best.label]
+        own = rank_runs(rows, verdict.measure, verdict.better)
+        best = own.get("median", own["best"])
+        others = {role: run for role, run in ranks.items() if role != "best" and run != best}
+        ranks = {"best": best, **others}
+    with_snapshots = {
+        r: run for r, run in ranks.items() if list_moments(study_folder / "runs" / run)
+    }
+    if with_snapshots:
+        return with_snapshots if len(ranks) > 1 else {"only": next(iter(with_snapshots.values()))}
+    count = {str(r): len(list_moments(study_folder / "runs" / str(r))) for r in summary[RUN]}
+    longest = max(count, key=lambda r: count[r], default="")
+    return {"longest": longest} if count.get(longest) else {}
 
 
 def time_chart(
@@ -98,7 +121,7 @@ def time_chart(
         least = factor * float(usable_values(summary, measure).min())
         xy_all[:, 1] = np.maximum(xy_all[:, 1], _SHOWN_BELOW * least)
     by_run = {str(run): xy_all[rows] for run, rows in charted.groupby(RUN).indices.items()}
-    stride = max(1, len(charted) // _POINTS)
+    stride = len(charted) // _POINTS
     colour = setting_tints(verdict, keys)
     labelled = _labelled(verdict)
     lines: list[Line] = []
@@ -114,23 +137,33 @@ def time_chart(
                 continue
             xy = by_run[str(run)]
             ended = f", {why_unused(why) or outcome}" if why else ""
-            lines.append(
-                Line(
-                    _thinned(xy, stride),
-                    tint,
-                    title=f"{run}: {setting.label}{ended}",
-                    group=setting.label,
-                )
-            )
+            title = f"{run}: {setting.label}{ended}"
+            lines.append(Line(thinned(xy, stride), tint, title=title, group=setting.label))
             if not why:
                 complete.append(xy[np.isfinite(xy).all(axis=1)])
         mean = _mean_curve(complete)
         if mean is not None:
             label = setting.label if setting.label in labelled else ""
             title = f"{setting.label}, mean of {len(complete)}"
-            means.append(Line(_thinned(mean, stride), tint, "mean", label, title, setting.label))
+            means.append(Line(thinned(mean, stride), tint, "mean", label, title, setting.label))
     when = "time of vibration, s" if clock == VIBRATION_TIME_S else "time, s"
     return Chart(when, what, _alt(what, when, means), tuple(lines + means), log_y=log_y)
+
+
+def measure_curves(
+    collected: Collected, verdict: Verdict, measures: Sequence[str]
+) -> tuple[Chart, ...]:
+    """Charts of measures against time, those that no run has left out."""
+    drawn, part = drawn_part(collected, verdict)
+    every = (
+        time_chart(drawn.curves, drawn.summary, part, collected.keys, each) for each in measures
+    )
+    return tuple(chart for chart in every if chart is not None)
+
+
+def curve_figures(curves: Iterable[Chart]) -> dict[str, Chart]:
+    """Measures over time, as files."""
+    return numbered("curves", curves)
 
 
 def _ends_wide(summary: pd.DataFrame, verdict: Verdict, keys: Sequence[str], measure: str) -> bool:
@@ -146,11 +179,6 @@ def _labelled(verdict: Verdict) -> set[str]:
         return {s.label for s in verdict.settings}
     chosen = [verdict.settings[0], verdict.settings[-1], verdict.best, verdict.runner_up]
     return {s.label for s in chosen if s is not None}
-
-
-def _thinned(xy: NDArray[np.float64], stride: int) -> NDArray[np.float64]:
-    """Every so many points, the last one kept."""
-    return np.concatenate([xy[:-1:stride], xy[-1:]])
 
 
 def _mean_curve(curves: Sequence[NDArray[np.float64]]) -> NDArray[np.float64] | None:
@@ -192,28 +220,18 @@ def objective_charts(
         return (_row_chart(summary, verdict),)
     values = usable_values(summary, verdict.measure)
     factor, what = display_scale(verdict.measure)
-    numeric = [k for k in keys if pd.api.types.is_numeric_dtype(summary[k])]
-    return tuple(
-        Chart(
-            titled(key),
-            what,
-            f"{name_of(verdict.measure)} of every run against {titled(key)}.",
-            marks=tuple(
-                Mark(
-                    float(x),
-                    factor * float(y),
-                    "run",
-                    tints(1, False)[0],
-                    title=f"{run}: {number(y)}",
-                )
-                for run, x, y in zip(summary[RUN], summary[key], values, strict=True)
-                if math.isfinite(y)
-            ),
-            log_x=spans(summary[key], WIDE_KEY),
-            log_y=verdict.is_wide,
+    (tint,), charts = tints(1, False), []
+    for key in (k for k in keys if pd.api.types.is_numeric_dtype(summary[k])):
+        alt = f"{name_of(verdict.measure)} of every run against {titled(key)}."
+        marks = tuple(
+            Mark(float(x), factor * float(y), "run", tint, title=f"{run}: {number(y)}")
+            for run, x, y in zip(summary[RUN], summary[key], values, strict=True)
+            if math.isfinite(y)
         )
-        for key in numeric
-    )
+        log_x = spans(summary[key], WIDE_KEY)
+        chart = Chart(titled(key), what, alt, marks=marks, log_x=log_x, log_y=verdict.is_wide)
+        charts.append(chart)
+    return tuple(charts)
 
 
 def _scale_chart(summary: pd.DataFrame, verdict: Verdict, key: str) -> Chart:

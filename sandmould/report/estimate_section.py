@@ -14,8 +14,7 @@ from sandmould.definition.study import Study
 from sandmould.drawing.figure_files import pictures, strip
 from sandmould.report.kinds.kind import Findings
 from sandmould.report.kinds.registry import report_of
-from sandmould.report.pictured_runs import Heap
-from sandmould.report.tables import Cell, Column, Table
+from sandmould.report.tables import Cell, Column, ReportPicture, Table, cells, number_cell
 from sandmould.runs.columns import CPU_S, RUN, total_s
 from sandmould.runs.formatting import name_of, number, seconds, titled, unit_of, with_margin
 from sandmould.runs.templates import sentences, worded
@@ -49,7 +48,7 @@ class EstimatePages:
     sentences: tuple[str, ...]
     sound: bool
     """Whether the study's question is answered."""
-    heaps: tuple[Heap, ...]
+    heaps: tuple[ReportPicture, ...]
     map: Table | None
     map_picture: str
     sands: tuple[SandEstimate, ...]
@@ -74,30 +73,24 @@ def estimate_pages(page: Findings[Any]) -> EstimatePages | None:
     said = [*detail_sentences(answer), *_reported(settings, verdict.measure, study)]
     said += _touching(summary)
     said += [sentence for sand in sands for sentence in sand.sentences[:1]]
+    found = [sand for sand in sands if sand.posterior]
+    lacking = [sand.name for sand in sands if not sand.posterior]
     numeric = [k for k in keys if pd.api.types.is_numeric_dtype(summary[k])]
     is_map = len(keys) == 2 and len(numeric) == 2
     what = name_of(verdict.measure)
+    runs = "The run" if len(summary) == 1 else f"All {len(summary)} runs"
     return EstimatePages(
         title="Angle of repose" if verdict.measure == "heap_angle_deg" else what.capitalize(),
-        headline=_headline(sands),
+        headline=worded("calibrated_head.j2", found=found, lacking=lacking) if sands else "",
         sentences=tuple(said) or (first_sentence(answer),),
-        sound=bool(settings) and all(sand.posterior for sand in sands),
+        sound=bool(settings) and not lacking,
         heaps=report_of(page.scenario).heaps(study_folder, summary, verdict, page.scenario),
         map=_map_table(settings, (keys[0], keys[1])) if is_map and settings else None,
         map_picture=_map_picture(summary, keys, verdict.measure, calibrated) if is_map else "",
         sands=sands,
         worths=_worth_table(calibrated) if calibrated and calibrated.worths else None,
-        cost=_cost(summary),
+        cost=f"{runs} took {seconds(total_s(summary, CPU_S))} of processor time.",
     )
-
-
-def _headline(sands: Sequence[SandEstimate]) -> str:
-    """Which sands were calibrated, and to what; empty where none was to be."""
-    if not sands:
-        return ""
-    lacking = [sand.name for sand in sands if not sand.posterior]
-    found = [sand for sand in sands if sand.posterior]
-    return worded("calibrated_head.j2", found=found, lacking=lacking)
 
 
 def estimate_figures(pages: EstimatePages) -> dict[str, bytes]:
@@ -106,7 +99,7 @@ def estimate_figures(pages: EstimatePages) -> dict[str, bytes]:
         map=pages.map_picture, **{f"posterior_{sand.name}": sand.posterior for sand in pages.sands}
     )
     if pages.heaps:
-        files["heaps"] = strip([(heap.heading, heap.picture) for heap in pages.heaps])
+        files["heaps"] = strip([(heap.caption, heap.address) for heap in pages.heaps])
     return files
 
 
@@ -155,12 +148,12 @@ def _map_table(settings: Sequence[Setting], keys: tuple[str, str]) -> Table:
     columns += [Column(f"{head(keys[1], c)}{unit}") for c in columns_of]
     rows = []
     for r in rows_of:
-        cells = [Cell(head(keys[0], r), repr(r))]
+        row = [Cell(head(keys[0], r), repr(r))]
         for c in columns_of:
             setting = at.get((r, c))
             text = "–" if setting is None else with_margin(setting.mean, setting.ci_half_width)
-            cells.append(Cell(text, repr(math.nan if setting is None else setting.mean)))
-        rows.append(tuple(cells))
+            row.append(Cell(text, repr(math.nan if setting is None else setting.mean)))
+        rows.append(tuple(row))
     return Table(tuple(columns), tuple(rows), (False,) * len(rows))
 
 
@@ -216,17 +209,7 @@ def _worth_table(calibrated: Calibrated) -> Table:
     rows = []
     for w in calibrated.worths:
         rate = w.bits_added / w.cpu_s * 3600 if w.cpu_s > 0.0 else math.inf
-        cells = (
-            Cell(name_of(w.measure), w.measure),
-            Cell(number(w.bits_alone, 2), repr(w.bits_alone)),
-            Cell(number(w.bits_added, 2), repr(w.bits_added)),
-            Cell(seconds(w.cpu_s) if w.cpu_s else "none", repr(w.cpu_s)),
-            Cell(number(rate), repr(rate)),
-        )
-        rows.append(cells)
+        bits = (number_cell(each, 2) for each in (w.bits_alone, w.bits_added))
+        cost = Cell(seconds(w.cpu_s) if w.cpu_s else "none", str(w.cpu_s))
+        rows.append(cells(Cell(name_of(w.measure), w.measure), *bits, cost, rate))
     return Table(columns, tuple(rows), (False,) * len(rows))
-
-
-def _cost(summary: pd.DataFrame) -> str:
-    runs = "The run" if len(summary) == 1 else f"All {len(summary)} runs"
-    return f"{runs} took {seconds(total_s(summary, CPU_S))} of processor time."

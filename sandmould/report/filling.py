@@ -109,16 +109,10 @@ def _fill_at_times(
 
 def _chart(table: _AtTimes, study: Study, key: str, measure: str) -> Chart:
     colours = tints(len(table.time_s), True)
-    lines = [
-        Line(
-            np.column_stack([table.x, table.mean[:, i]]),
-            colours[i],
-            "mean",
-            f"{number(time_s, 2)} s",
-            f"after {number(time_s, 2)} s of vibration",
-        )
-        for i, time_s in enumerate(table.time_s)
-    ]
+    lines = []
+    for time_s, mean, tint in zip(table.time_s, table.mean.T, colours, strict=True):
+        xy, time = np.column_stack([table.x, mean]), f"{number(time_s, 2)} s"
+        lines.append(Line(xy, tint, "mean", time, f"after {time} of vibration"))
     low, high = float(np.nanmin(table.mean)), float(np.nanmax(table.mean))
     lines += reported_lines(study, key, low, high)
     alt = f"{name_of(measure)} against {titled(key)} at {len(table.time_s)} times of the vibration."

@@ -7,7 +7,6 @@ at the probes of each run.
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
@@ -36,17 +35,9 @@ SIGNS = {
 
 
 def stability_map(summary: pd.DataFrame, keys: Sequence[str]) -> str:
-    """Draw the map, a panel for each c_poi and each value of what else is swept.
+    """Draw the map of runs that ended, a panel for each c_poi and each value of what else is swept.
 
-    Parameters
-    ----------
-    summary : DataFrame
-        Runs that ended, each with its classification.
-
-    Returns
-    -------
-    str
-        A ``data:`` address; empty unless time step and relaxations are swept.
+    A ``data:`` address; empty unless time step and relaxations are swept.
     """
     if not set(AXES) <= set(keys) or summary.empty:
         return ""
@@ -134,25 +125,12 @@ HIGHEST = 3.0
 """Peaks above so many times the largest hydrostatic pressure are cut off."""
 
 
-@dataclass(frozen=True)
-class PressureHistory:
-    """The pressure of one run in time."""
-
-    chart: Chart
-    setting: str
-    rating: str
-
-
 def pressure_history(
     folder: Path, setting: str, rating: str, ideal_pa: Mapping[str, float]
-) -> PressureHistory:
-    """Draw the pressure at each probe of a run, with its hydrostatic value.
+) -> Chart:
+    """Draw the pressure at each probe of a run, with its hydrostatic value, by probe in Pa.
 
-    Parameters
-    ----------
-    setting, rating : str
-        What is swept, and how stable the run is.
-    ideal_pa : mapping of probe to float, Pa
+    ``setting``, ``rating``: what is swept, and how stable the run is.
     """
     table = pd.read_csv(folder / "series.tsv", sep="\t")
     time_s = table[TIME_S].to_numpy(dtype=np.float64)
@@ -166,20 +144,13 @@ def pressure_history(
             Line(level, tint, "joined", title=f"hydrostatic at {name}: {ideal:.0f} Pa"),
         ]
     alt = f"Pressure at {', '.join(ideal_pa)} against time at {setting}: {rating}."
-    return PressureHistory(Chart("time, s", "pressure, Pa", alt, tuple(lines)), setting, rating)
+    return Chart("time, s", "pressure, Pa", alt, tuple(lines))
 
 
 def extremes(x: NDArray[np.float64], y: NDArray[np.float64]) -> NDArray[np.float64]:
     """The lowest and the highest point of each part of a curve, in their order.
 
-    Parameters
-    ----------
-    x, y : (n,) float64
-
-    Returns
-    -------
-    (k, 2) float64
-        All points where there are at most two a part; NaN is passed over.
+    (k, 2) float64: all points where there are at most two a part; NaN is passed over.
     """
     points = np.column_stack([x, y])[np.isfinite(y)]
     if len(points) <= 2 * BINS:

@@ -11,14 +11,14 @@ from sandmould.kinds.sand.narrow import narrow_spaces
 from sandmould.report.tables import Cell, Column, Table
 from sandmould.runs.columns import RUN, VIBRATION_TIME_S, during_vibration
 from sandmould.runs.formatting import display_number, display_range, name_of
+from sandmould.runs.templates import sentences
 from sandmould.scenario.scenario import Scenario
 from sandmould.statistics.decision import aims_beside
-from sandmould.statistics.grain_change import GrainChange, grain_changes
+from sandmould.statistics.grain_change import GrainChange, grain_changes, order_of
 from sandmould.statistics.grain_check import FACTOR
 from sandmould.statistics.over_time import first_reach_s
 from sandmould.study.collect import Collected
 from sandmould.study.robustness.controls import COARSER
-from sandmould.wording.grain_size import grain_sentences
 
 FILLED = 0.9
 """Share of its last fill at which a cavity counts as filled."""
@@ -46,14 +46,7 @@ def grain_size_pages(
 ) -> GrainSizePages | None:
     """Compare the runs with coarser grains with those of the sweep; None without such runs.
 
-    Parameters
-    ----------
-    collected : Collected
-        Of all runs.
-    scenario : Scenario
-        Of the run that is shown.
-    best : str
-        Label of the best setting.
+    ``scenario``: of the run that is shown; ``best``: label of the best setting.
     """
     objective = study.objective
     aims = aims_beside(objective.measure, objective.beside, collected.summary)
@@ -69,9 +62,19 @@ def grain_size_pages(
         return None
     narrow = [name for space in narrow_spaces(scenario) for name in space.names]
     beside = [c for c in changes if c.measure in asked[1:] and c.label == best]
+    first, *others = of_objective
+    order = order_of(first, others[0], objective.better) if others else ""
     short, said = (
-        grain_sentences(of_objective, beside, objective.better, narrow, is_short)
-        for is_short in (True, False)
+        sentences(
+            "grain_size.j2",
+            changes=of_objective,
+            shown=[*told, *beside],
+            factor=f"{FACTOR:g}",
+            two=bool(others),
+            order=order,
+            narrow=narrow,
+        )
+        for told in (of_objective[:1], of_objective)
     )
     return GrainSizePages(short, said, _table(changes))
 

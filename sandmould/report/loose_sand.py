@@ -11,7 +11,7 @@ import numpy as np
 
 from sandmould.engines.snapshot import scene_at
 from sandmould.kinds.sand.moments import list_moments
-from sandmould.report.tables import Cell, Column, Table
+from sandmould.report.tables import Cell, Column, Table, cells
 from sandmould.runs.formatting import number
 from sandmould.runs.templates import sentences
 from sandmould.scenario.scenario import Scenario
@@ -35,12 +35,7 @@ def loose_sand_pages(
     if not run or not scenario.scene.solids or scenario.gate is not None:
         return None
     from sandmould.analysis.loose_zones import BALL_GRAINS, LOOSE, find_loose_sand
-    from sandmould.drawing.loose_field import (  # scipy: few need it
-        LEAST,
-        MOST,
-        draw_loose_field,
-        on_surfaces,
-    )
+    from sandmould.drawing import loose_field
 
     moments = list_moments(folder / "runs" / run)
     if not moments:
@@ -71,9 +66,9 @@ def loose_sand_pages(
     )
     return {
         "sentences": said,
-        "picture": draw_loose_field(loose.field, numbers, last, scenario, height_m),
-        "surface": on_surfaces(loose.field) if scenario.dimension == 3 else None,
-        "ends": (LEAST, MOST),
+        "picture": loose_field.draw_loose_field(loose.field, numbers, last, scenario, height_m),
+        "surface": loose_field.on_surfaces(loose.field) if scenario.dimension == 3 else None,
+        "ends": (loose_field.LEAST, loose_field.MOST),
         "loose": LOOSE,
         "reach_mm": 1e3 * 0.5 * BALL_GRAINS * grain_m,
         "table": _table([loose.zones[place - 1] for place in numbers], scenario),
@@ -92,9 +87,8 @@ def _table(zones: Sequence[LooseZone], scenario: Scenario) -> Table:
     rows = []
     for place, zone in enumerate(zones, start=1):
         where = f"{'in' if zone.is_inside else zone.side} the {zone.near.replace('_', ' ')}"
-        cells = [Cell(str(place), str(place)), Cell(where, where)]
-        for low, high in zip(1e3 * zone.low_m, 1e3 * zone.high_m, strict=True):
-            cells.append(Cell(f"{low:.0f} to {high:.0f}", str(low)))
+        ends = zip(1e3 * zone.low_m, 1e3 * zone.high_m, strict=True)
+        box = (Cell(f"{low:.0f} to {high:.0f}", str(low)) for low, high in ends)
         values = (_MM[scenario.dimension] * zone.measure, zone.measure / grain, zone.solid_fraction)
-        rows.append((*cells, *(Cell(number(value, 3), str(value)) for value in values)))
+        rows.append(cells(str(place), where, *box, *values))
     return Table(columns, tuple(rows), (False,) * len(rows))

@@ -56,13 +56,8 @@ def optimum_pages(
 ) -> OptimumPages | None:
     """Say where the optimum of a study with rounds or controls lies; None for others.
 
-    Parameters
-    ----------
-    robustness : RobustnessPages, optional
-        Its verdict comes first where the optimum is an artefact, or where no frequency is
-        recommended.
-    mode : BedMode, optional
-        First mode of the bed, told beside a frequency.
+    What ``robustness`` says comes first where the optimum is an artefact, or where no frequency is
+    recommended; ``mode`` is told beside a frequency.
     """
     if not (study.refine.adds_points or study.certificate.controls):
         return None

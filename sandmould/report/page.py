@@ -15,13 +15,13 @@ from jinja2 import Environment
 
 from sandmould.bad_input import BadInputError
 from sandmould.definition.certificate import frequency_among
+from sandmould.definition.run import Run
 from sandmould.definition.study import Study
 from sandmould.definition.sweep import points
 from sandmould.drawing.animation import BUDGET_BYTES
 from sandmould.drawing.chart import NARROW, SMALL, WIDE, Chart, lay_out
-from sandmould.drawing.figure_files import numbered, write_figures
+from sandmould.drawing.figure_files import numbered, page_environment, write_figures
 from sandmould.drawing.small_multiples import small_multiples
-from sandmould.drawing.templates import page_environment
 from sandmould.drawing.thinning import drawn_note, drawn_part, listed_settings
 from sandmould.kinds.kind import AnyScenario
 from sandmould.kinds.registry import kind_named
@@ -34,13 +34,12 @@ from sandmould.report.answer import (
     table_of,
 )
 from sandmould.report.bed_mode import BedMode
-from sandmould.report.curves import objective_charts
+from sandmould.report.curves import objective_charts, pictured_runs
 from sandmould.report.estimate_section import EstimatePages, estimate_figures, estimate_pages
 from sandmould.report.kinds.kind import Findings, KindPages
 from sandmould.report.kinds.registry import report_of
 from sandmould.report.method import own_measures_method, provenance_rows, statistics_method
 from sandmould.report.optimum import OptimumPages, effort_sentence, optimum_pages, with_surface
-from sandmould.report.pictured_runs import pictured_runs
 from sandmould.report.robustness import RobustnessPages
 from sandmould.report.tables import KeyNumber, data_files, key_numbers, runs_table, settings_table
 from sandmould.runs.columns import DETAIL, RUN, finished
@@ -64,22 +63,13 @@ from sandmould.study.plan.plan_files import (
 )
 from sandmould.study.plan.stand_ins import stand_ins
 from sandmould.study.rounds.round_log import read_rounds
+from sandmould.wording import next_steps
 from sandmould.wording.answer import (
     detail_sentences,
     first_sentence,
     limit_sentences,
     main_effect_sentences,
     reasons_text,
-)
-from sandmould.wording.next_steps import (
-    agreement_steps,
-    answer_steps,
-    certificate_steps,
-    failed_steps,
-    optimum_steps,
-    sand_steps,
-    step,
-    with_file,
 )
 
 LIMIT_BYTES = 15_000_000
@@ -126,9 +116,10 @@ def write_report(study_folder: Path, out: Path) -> None:
 def _page(study_folder: Path, home: Path, study: Study, collected: Collected) -> Findings[Any]:
     objective, keys, summary = study.objective, collected.keys, collected.of_sweep.summary
     seeks_best = study.seeks_best
-    any_scenario = _scenario_of(study_folder, summary[RUN])
-    if any_scenario is None:
+    any_run = _first_of(study_folder, summary[RUN])
+    if any_run is None:
         raise ValueError(f"{study_folder}: no run has a readable scenario.yaml")
+    any_scenario = any_run.scenario
     is_controlled = bool(read_rounds(study_folder, study).certified_hz)
     notes = report_of(any_scenario).notes(any_scenario, collected, seeks_best, is_controlled)
     if not (study_folder / STUDY_FILE).exists():
@@ -138,10 +129,9 @@ def _page(study_folder: Path, home: Path, study: Study, collected: Collected) ->
     listed = {setting.label for setting in listed_settings(verdict)}
     by_setting = {}
     for values, rows in setting_rows(summary, keys):
-        if (label := setting_text(values)) in listed:
-            own = _scenario_of(study_folder, summary[RUN].iloc[rows])
-            if own is not None:
-                by_setting[label] = own, summary.iloc[rows]
+        label, own_runs = setting_text(values), summary.iloc[rows]
+        if label in listed and (own := _first_of(study_folder, own_runs[RUN])):
+            by_setting[label] = own.scenario, own_runs
     by_lot = kind_named(study.kind).draws_by_lot
     varied = tuple(key for key in keys if summary[key].astype(str).nunique() > 1)
     asked = Asked(
@@ -153,23 +143,15 @@ def _page(study_folder: Path, home: Path, study: Study, collected: Collected) ->
         for s in verdict.settings
         if s.label in drives
     }
-    curves = collected.of_sweep.curves
-    placeholders = _stand_ins(study_folder, summary[RUN])
+    curves, placeholders = collected.of_sweep.curves, stand_ins(any_run)
     answer = decide(asked, Evidence(summary, curves, of_varied, placeholders, study.table_limit_at))
     relative = os.path.relpath(study_folder.absolute(), home)
     href = "" if relative == "." else quote(Path(relative).as_posix()) + "/"
-    scenario = _scenario_of(study_folder, [pictured_run] if pictured_run else []) or any_scenario
+    shown = _first_of(study_folder, [pictured_run] if pictured_run else []) or any_run
+    scenario = shown.scenario
     return Findings(
         study_folder, href, study, collected, verdict, answer, scenario, by_setting, notes
     )
-
-
-def _stand_ins(study_folder: Path, runs: Iterable[str]) -> tuple[str, ...]:
-    """Values of materials that are not what they stand for, in the first run that can be read."""
-    for run in runs:
-        with contextlib.suppress(BadInputError, OSError):
-            return stand_ins(read_run(study_folder / "runs" / str(run) / "scenario.yaml"))
-    return ()
 
 
 def _drives(by_setting: Mapping[str, tuple[AnyScenario, pd.DataFrame]]) -> dict[str, BoxDrive]:
@@ -181,11 +163,11 @@ def _drives(by_setting: Mapping[str, tuple[AnyScenario, pd.DataFrame]]) -> dict[
     return {label: drive for label, drive in every.items() if drive is not None}
 
 
-def _scenario_of(study_folder: Path, runs: Iterable[str]) -> AnyScenario | None:
-    """Scenario of the first run whose file can be read."""
+def _first_of(study_folder: Path, runs: Iterable[str]) -> Run | None:
+    """The first run whose file can be read."""
     for run in runs:
         with contextlib.suppress(BadInputError, OSError):
-            return read_run(study_folder / "runs" / str(run) / "scenario.yaml").scenario
+            return read_run(study_folder / "runs" / str(run) / "scenario.yaml")
     return None
 
 
@@ -286,7 +268,7 @@ def _first_screen(
     study, collected, answer = page.study, page.collected, page.answer
     summary = collected.of_sweep.summary
     headline, is_sound = first_sentence(answer), answer.is_sound
-    steps = answer_steps(study, answer)
+    steps = next_steps.answer_steps(study, answer)
     figures: tuple[KeyNumber, ...] = ()
     table = None
     if optimum is not None:
@@ -294,16 +276,16 @@ def _first_screen(
             optimum, robustness, answer, summary, study.certificate.sand_wave_speed is not None
         )
         assessed = robustness.assessment if robustness else None
-        steps = optimum_steps(study, optimum.optimum, assessed)
+        steps = next_steps.optimum_steps(study, optimum.optimum, assessed)
         is_artefact = assessed is not None and assessed.is_artefact
         figures = optimum_choice(optimum, summary, answer.verdict, is_artefact)
     elif agreement is not None and agreement.is_question:
         headline, is_sound = agreement.sentences[0], agreement.sound
-        steps = agreement_steps(agreement.sound)
+        steps = [next_steps.step("take_cheapest" if agreement.sound else "differ")]
     elif estimate is not None:
         is_sound = is_sound and estimate.sound
         headline = of_kind.answer or estimate.headline or headline
-        steps += sand_steps(study, is_sound)
+        steps += next_steps.sand_steps(study, is_sound)
     else:
         figures, table = figures_of(answer, summary), table_of(answer)
     grounds = (
@@ -314,11 +296,12 @@ def _first_screen(
     )
     lost = collected.summary[~finished(collected.summary)]
     causes = dict(zip(lost[RUN].astype(str), lost[DETAIL].fillna("").astype(str), strict=True))
-    steps = [*failed_steps(causes), *steps, *of_kind.steps, *certificate_steps(study, answer)]
+    steps = [*next_steps.failed_steps(causes), *steps, *of_kind.steps]
+    steps += next_steps.certificate_steps(study, answer)
     if is_sound and study.seeks_best and not steps:
-        steps.append(of_kind.at_last or step("try", is_sand=study.kind == "sand"))
+        steps.append(of_kind.at_last or next_steps.step("try", is_sand=study.kind == "sand"))
     owner = owner_of(page.study_folder)
-    after = with_file(steps, owner, shipped_name(owner), page.study_folder.name)
+    after = next_steps.with_file(steps, owner, shipped_name(owner), page.study_folder.name)
     return FirstScreen(headline, is_sound, figures, table, grounds, after)
 
 

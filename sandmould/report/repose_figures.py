@@ -18,9 +18,9 @@ from sandmould.drawing.figures import cut_m, panel, png
 from sandmould.engines.snapshot import Snapshot
 from sandmould.kinds.sand.moments import list_moments
 from sandmould.kinds.sand.outflow import slopes
-from sandmould.report.pictured_runs import Heap
+from sandmould.report.tables import ReportPicture
 from sandmould.runs.columns import RUN
-from sandmould.runs.formatting import name_of, number, unit_of
+from sandmould.runs.formatting import number, titled
 from sandmould.scenario.scenario import Scenario
 from sandmould.statistics.calibration.posterior import axes_of, surface
 from sandmould.statistics.calibration.sands import CalibratedSand
@@ -46,8 +46,7 @@ def axis_title(key: str) -> str:
         return "rolling angle α, °"
     if key.endswith("grain_grain.friction"):
         return "sliding friction μ between grains"
-    unit = unit_of(key)
-    return f"{name_of(key)}, {unit}" if unit else name_of(key)
+    return titled(key)
 
 
 def draw_heap(snapshot: Snapshot, scenario: Scenario, height_m: float) -> str:
@@ -87,14 +86,8 @@ def draw_map(
 ) -> str:  # fmt: skip
     """Draw a measure over the two swept keys as contours, with the runs and the iso-lines.
 
-    Parameters
-    ----------
-    keys : tuple of str
-        The second goes along x, as in Figure 12 of the paper.
-    points : (n, 2) float64
-        Values of the keys of the runs.
-    sands : sequence of CalibratedSand
-        Whose lines of this measure are drawn with their bands.
+    The second key goes along x, as in Figure 12 of the paper. ``points``: (n, 2) float64, values of
+    the keys of the runs; ``sands``: whose lines of this measure are drawn with their bands.
     """
     figure = Figure(figsize=(7.6, 5.2), dpi=110, layout="constrained")
     ax = figure.add_subplot()
@@ -152,7 +145,7 @@ PICTURED_HEAPS = 3
 
 def steepest_heaps(
     study_folder: Path, summary: pd.DataFrame, verdict: Verdict, scenario: Scenario
-) -> tuple[Heap, ...]:
+) -> tuple[ReportPicture, ...]:
     """Draw runs with the least, the middle and the steepest slope; none without a level gate."""
     if scenario.gate is None or not scenario.gate.is_level:
         return ()
@@ -167,5 +160,6 @@ def steepest_heaps(
         sand = moments[-1].load()
         heading = f"{number(values[index])}°: {run}"
         picture = draw_heap(sand, scenario, 1.02 * scenario.scene.top_m)
-        heaps.append(Heap(heading, picture, f"Heap and hopper of run {run} with fitted lines"))
+        alt = f"Heap and hopper of run {run} with fitted lines"
+        heaps.append(ReportPicture(picture, alt, heading))
     return tuple(heaps)

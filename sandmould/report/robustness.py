@@ -15,7 +15,7 @@ from sandmould.definition.certificate import frequency_key
 from sandmould.definition.study import Study
 from sandmould.drawing.chart import PLAIN, Chart, Line, tints
 from sandmould.report.bed_mode import BedMode, Response, bed_mode
-from sandmould.report.tables import Cell, Column, Table
+from sandmould.report.tables import Cell, Column, Table, cells, number_cell
 from sandmould.runs.columns import STAGE, TIME_S
 from sandmould.runs.formatting import number
 from sandmould.runs.templates import worded
@@ -59,12 +59,7 @@ def robustness_pages(
 ) -> RobustnessPages | None:
     """Assess and draw the controls of a study; None before they are chosen, or without any.
 
-    Parameters
-    ----------
-    collected : Collected
-        Of all runs.
-    scenario : Scenario
-        Of any run of the sweep.
+    ``scenario``: of any run of the sweep.
     """
     key = frequency_key(study.sweep)
     certified_hz = read_rounds(study_folder, study).certified_hz
@@ -99,24 +94,15 @@ def _table(robustness: Robustness, certified_hz: Sequence[float]) -> Table:
         Column("95 % interval"),
         Column("the optimum", False),
     )
-    rows = [("the sweep itself", robustness.sweep, math.nan, "–", "–")]
+    rows = [cells("the sweep itself", *robustness.sweep, math.nan, "–", "–")]
     for shift in robustness.shifts:
         low, high = shift.ci
         interval = "–" if math.isnan(low) else f"{number(low, 2)} to {number(high, 2)}"
         verdict = _WORDS.get(shift.verdict, shift.verdict)
-        rows.append((shift.name, shift.means, shift.shift, interval, verdict))
-    cells = tuple(
-        (
-            Cell(name, name),
-            *(Cell(number(v), repr(v)) for v in means),
-            Cell(number(gain, 2), repr(gain)),
-            Cell(interval, interval),
-            Cell(verdict, verdict),
-        )
-        for name, means, gain, interval, verdict in rows
-    )
-    marked = tuple(verdict.startswith("moves") for *_, verdict in rows)
-    return Table(columns, cells, marked)
+        gain = number_cell(shift.shift, 2)
+        rows.append(cells(shift.name, *shift.means, gain, interval, verdict))
+    marked = tuple(verdict.text.startswith("moves") for *_, verdict in rows)
+    return Table(columns, tuple(rows), marked)
 
 
 def _responses(study_folder: Path, runs: Sequence[str]) -> list[Response]:
@@ -138,16 +124,10 @@ def _responses(study_folder: Path, runs: Sequence[str]) -> list[Response]:
             rows = total[total[STAGE] == StageKind.VIBRATE.numbered(place)]
             if len(rows) < 4:
                 continue
-            shaken.append(stage.frequency_hz)
-            response.append(
-                transfer(
-                    rows[TIME_S].to_numpy(dtype=np.float64),
-                    rows[upward].to_numpy(dtype=np.float64),
-                    stage.frequency_hz,
-                    window_s,
-                    rigid_n,
-                )
-            )
+            frequency_hz = stage.frequency_hz
+            time_s, force_n = (rows[c].to_numpy(dtype=np.float64) for c in (TIME_S, upward))
+            shaken.append(frequency_hz)
+            response.append(transfer(time_s, force_n, frequency_hz, window_s, rigid_n))
         responses.append((np.array(shaken), np.array(response)))
     return responses
 
@@ -185,15 +165,10 @@ def _spring_table(springs: SpringCheck) -> Table:
             best, low, high = curve.place_hz
             is_inner = curve.limbs.shape == "inner"
             place = f"{number(low)} to {number(high)}" if is_inner else "–"
-            rows.append(
-                (
-                    Cell(hold.hold, hold.hold),
-                    Cell(f"x{curve.factor:g}", repr(curve.factor)),
-                    Cell(number(best) if is_inner else "–", repr(best)),
-                    Cell(place, place),
-                    *(Cell(number(drop, 2), repr(drop)) for drop in curve.limbs.drop),
-                    Cell(_LIMBS[curve.limbs.shape], curve.limbs.shape),
-                )
-            )
+            springs_cell = Cell(f"x{curve.factor:g}", str(curve.factor))
+            best_cell = Cell(number(best) if is_inner else "–", str(best))
+            drops = (number_cell(drop, 2) for drop in curve.limbs.drop)
+            limbs = Cell(_LIMBS[curve.limbs.shape], curve.limbs.shape)
+            rows.append(cells(hold.hold, springs_cell, best_cell, place, *drops, limbs))
             marked.append(not is_inner)
     return Table(columns, tuple(rows), tuple(marked))

@@ -21,8 +21,7 @@ from sandmould.drawing.sphere_film import SphereFilm, sphere_frames
 from sandmould.drawing.sphere_scene import SurfaceField, sphere_scene
 from sandmould.engines.snapshot import Snapshot
 from sandmould.kinds.sand.moments import MOMENTS, Moment, list_moments, nearest
-from sandmould.report.pictured_runs import pictured_runs
-from sandmould.report.time_series import measure_curves
+from sandmould.report.curves import measure_curves, pictured_runs
 from sandmould.runs.columns import (
     BED_HEIGHT_M,
     RUN,
@@ -52,20 +51,9 @@ def sand_pages(
     href: str,
     own_measures: Iterable[str] = (),
 ) -> dict[str, Any]:
-    """Draw everything that a study of sand shows.
+    """Draw everything that a study of sand shows, as ``sand.html`` names it; empty without data.
 
-    Parameters
-    ----------
-    scenario : Scenario
-        Of the run that is shown: the best one.
-    href : str
-        Address of the study's folder, seen from the report.
-
-    Returns
-    -------
-    dict of str to any
-        What ``sand.html`` names, empty without data; ``beside`` has films of all grains, scripts
-        that lie beside the page, by file name.
+    ``beside`` has films of all grains: scripts that lie beside the page, by file name.
     """
     roles = pictured_runs(study_folder, collected.summary, verdict)
     run = next(iter(roles.values()), "")
@@ -219,7 +207,7 @@ def _shown_runs(
 
 
 def _sphere_films(
-    shown: Sequence[_Shown], scale: figures.DensityScale, budget_bytes: int, folder_href: str
+    shown: Sequence[_Shown], scale: tuple[float, float], budget_bytes: int, folder_href: str
 ) -> tuple[tuple[SphereFilm, ...], dict[str, str]]:
     """Films of spheres for the page, and the scripts beside it."""
     films = []

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -13,17 +14,10 @@ from sandmould.analysis.freezing_plots import draw_part
 from sandmould.analysis.plots import LAYER_COLOURS
 from sandmould.bad_input import BadInputError, Problem
 from sandmould.casting.arpm.scene import solids_of
-from sandmould.drawing.figures import (
-    DensityScale,
-    cut_m,
-    dimensioned,
-    picture_address,
-    png_bytes,
-    svg_bytes,
-)
-from sandmould.drawing.sphere_film import SphereFilm, bare_film, sphere_frames
+from sandmould.drawing.figure_files import page_environment
+from sandmould.drawing.figures import cut_m, dimensioned, png, png_bytes, svg_bytes
+from sandmould.drawing.sphere_film import SphereFilm, sphere_frames
 from sandmould.drawing.sphere_scene import solid_scene, sphere_scene
-from sandmould.drawing.templates import page_environment
 from sandmould.engines.snapshot import Snapshot
 from sandmould.report.cast_fields import distance_from
 from sandmould.runs.files import replaced
@@ -80,9 +74,8 @@ def draw_scene_file(scenario: Scenario | Solidification, title: str, run: str, o
         elif out.suffix.lower() == ".png":
             file.write(png_bytes(figure))
         else:
-            picture = picture_address(png_bytes(figure))
             page = page_environment().get_template("scene.html")
-            file.write(page.render(title=title, run=run, picture=picture, **shown).encode())
+            file.write(page.render(title=title, run=run, picture=png(figure), **shown).encode())
 
 
 def _as_snapshot(bed: LikelyBed) -> Snapshot:
@@ -122,8 +115,8 @@ def _of_sand(scenario: Scenario, run: str) -> tuple[Figure, dict[str, Any]]:
     films: tuple[SphereFilm, ...] = ()
     scene: dict[str, object] = {}
     if scenario.dimension == 3:
-        frames = sphere_frames([grains], scenario, run, "planned", DensityScale(0.0, 1.0))
-        films = (frames.planned(bed.of_grains, bed.slice_m),)
+        frames = sphere_frames([grains], scenario, run, "planned", (0.0, 1.0))
+        films = (replace(frames.whole, of_grains=bed.of_grains, slice_m=bed.slice_m),)
         scene = sphere_scene(scenario, scenario.box.height_m)
         scene["marks"] = _arrow(scenario)
         # stronger than where the sand has moved: what is looked at here is the part
@@ -160,7 +153,7 @@ def _of_casting(scenario: Solidification, run: str) -> tuple[Figure, dict[str, A
         ),
         "slice_note": "",
         "vibrates": False,
-        "films": (bare_film(run),),
+        "films": (SphereFilm(run=run),),
         "scene": solid_scene(solids, low_m, high_m) if scenario.dimensions == 3 else {},
         "layer_colours": [],
     }

@@ -13,7 +13,7 @@ from openpyxl.styles import Font
 from openpyxl.utils import get_column_letter
 from openpyxl.worksheet.worksheet import Worksheet
 
-from sandmould.report.curves import runs_of
+from sandmould.report.curves import runs_by_setting
 from sandmould.runs.files import replaced
 from sandmould.runs.formatting import distinct_names, is_number, unit_of
 from sandmould.scenario.drive import ACCELERATION, DISPLACEMENT, VELOCITY
@@ -47,10 +47,10 @@ def write_spreadsheet(study_folder: Path, out: Path) -> None:
     aims = [objective, *aims_beside(objective.measure, objective.beside, summary)]
     verdicts = [compare_settings(summary, keys, a.measure, a.better).settings for a in aims]
     drive = [each for each in (DISPLACEMENT, VELOCITY, ACCELERATION) if each in summary]
-    rows = []
+    rows, rows_of = [], runs_by_setting(summary, keys)
     for judged in zip(*verdicts, strict=True):
         first = judged[0]
-        moved = runs_of(summary, first)[drive].mean()
+        moved = rows_of[first.label][drive].mean()
         shown = [_shown(key, first.values[key]) for key in keys]
         shown += [_shown(each, moved[each]) for each in drive]
         for aim, setting in zip(aims, judged, strict=True):
@@ -80,16 +80,10 @@ def write_spreadsheet(study_folder: Path, out: Path) -> None:
         book.save(partial)
 
 
-def _conversion(key: str) -> tuple[float, float]:
-    """Factor and offset from the tables to what is shown."""
-    _, factor, offset = _SHOWN.get(unit_of(key), ("", 1.0, 0.0))
-    return factor, offset
-
-
 def _shown(key: str, value: Any) -> Any:
     if not is_number(value):
         return value
-    factor, offset = _conversion(key)
+    _, factor, offset = _SHOWN.get(unit_of(key), ("", 1.0, 0.0))
     return factor * value + offset
 
 

@@ -12,29 +12,8 @@ from urllib.parse import quote
 import pandas as pd
 
 from sandmould.drawing.thinning import listed_note, listed_runs, listed_settings
-from sandmould.runs.columns import (
-    CPU_S,
-    DETAIL,
-    FILL,
-    FILL_CPU_S,
-    GRAIN_STEPS_PER_S,
-    GRAINS,
-    LARGEST_OVERLAP_FRACTION,
-    LEAST_LIMIT_S,
-    OUTCOME,
-    OUTCOME_CODE,
-    PART,
-    PEAK_MEMORY_BYTES,
-    REPLICATE,
-    RUN,
-    SEED,
-    SIMULATED_S,
-    SWEEP,
-    TIME_STEP_FRACTION,
-    WALL_S,
-    finished,
-    total_s,
-)
+from sandmould.runs import columns
+from sandmould.runs.columns import CPU_S, OUTCOME, REPLICATE, RUN, SEED, WALL_S, finished, total_s
 from sandmould.runs.formatting import (
     OF_BED,
     display_scale,
@@ -71,6 +50,16 @@ class KeyNumber:
 
 
 @dataclass(frozen=True)
+class ReportPicture:
+    """A picture of a page with what it shows."""
+
+    address: str
+    """A ``data:`` address."""
+    alt: str
+    caption: str
+
+
+@dataclass(frozen=True)
 class Cell:
     """What a cell shows and what it is sorted by."""
 
@@ -104,17 +93,8 @@ def share_of_what_fits(
 ) -> float:
     """How much of what a tube or cavity could hold is in it, as the mean of finished runs.
 
-    Parameters
-    ----------
-    measure : str
-        The fill of that space.
-    values : mapping of str to object, optional
-        A setting; all settings together unless given.
-
-    Returns
-    -------
-    float
-        1 where it is packed as densely as the bed; NaN where runs do not tell.
+    ``measure``: the fill of that space; ``values``: a setting, all together unless given. 1 where
+    it is packed as densely as the bed; NaN where runs do not tell.
     """
     column = filled_space(measure) + OF_BED
     if column not in summary:
@@ -129,7 +109,7 @@ def key_numbers(summary: pd.DataFrame) -> tuple[KeyNumber, ...]:
     """Runs that finished, size, cost and health of the runs, as far as their data are there."""
     numbers: list[KeyNumber] = []
     complete = summary[finished(summary)]
-    checks = PART in summary and (summary[PART] != SWEEP).any()
+    checks = columns.PART in summary and (summary[columns.PART] != columns.SWEEP).any()
     label = "runs finished, checks included" if checks else "runs finished"
     numbers.append(KeyNumber(f"{len(complete)} of {len(summary)}", label))
     # a run that failed may have stopped before it had all its grains
@@ -143,14 +123,14 @@ def key_numbers(summary: pd.DataFrame) -> tuple[KeyNumber, ...]:
             numbers.append(KeyNumber(count_text, f"{what} {where}"))
     wall_s, cpu_s = total_s(summary, WALL_S), total_s(summary, CPU_S)
     if wall_s > 0.0:
-        fills = summary[FILL].nunique() if FILL in summary else 0
+        fills = summary[columns.FILL].nunique() if columns.FILL in summary else 0
         added_up = f"all runs and {fills} shared fills added up" if fills else "all runs added up"
         note = f"{seconds(cpu_s)} of processor time" if cpu_s > 0.0 else ""
         numbers.append(KeyNumber(seconds(wall_s), f"computing, {added_up}", note))
-    speed = _total(typical, GRAIN_STEPS_PER_S, "median")
+    speed = _total(typical, columns.GRAIN_STEPS_PER_S, "median")
     if speed is not None:
         numbers.append(KeyNumber(f"{number(speed / 1e6)} M", "grain-steps a second, median run"))
-    overlap = _total(summary, LARGEST_OVERLAP_FRACTION, "max")
+    overlap = _total(summary, columns.LARGEST_OVERLAP_FRACTION, "max")
     if overlap is not None:
         numbers.append(KeyNumber(f"{100 * overlap:.1f} %", "largest overlap, of a radius"))
     return tuple(numbers)
@@ -176,7 +156,7 @@ def settings_table(verdict: Verdict, drives: Mapping[str, BoxDrive]) -> Table:
         *map(Column, (f"best {'over' if by_factor else 'minus'} this", "95 % interval", "p")),
         Column("beside the best", False),
     )
-    columns = (
+    heads = (
         Column("setting", False),
         Column(f"{named}, mean ± 95 %"),
         *(of_best if seeks_best else ()),
@@ -196,7 +176,7 @@ def settings_table(verdict: Verdict, drives: Mapping[str, BoxDrive]) -> Table:
                 interval = f"{low} to {high}"
                 standing = "worse" if against.separated else "no clear difference"
         beside_best = (
-            *_number_cells((difference, 2)),
+            number_cell(difference, 2),
             Cell(interval, str(difference)),
             Cell(_p_text(p), str(p)),
             Cell(standing, standing),
@@ -207,15 +187,15 @@ def settings_table(verdict: Verdict, drives: Mapping[str, BoxDrive]) -> Table:
                 Cell(setting.label, str(place)),
                 Cell(with_margin(mean, half_width), str(setting.mean)),
                 *(beside_best if seeks_best else ()),
-                *_number_cells((factor * setting.sd, 2)),
+                number_cell(factor * setting.sd, 2),
                 Cell(f"{setting.n} of {setting.planned}", str(setting.n)),
-                *_drive_cells(drives.get(setting.label), bool(drives)),
+                *(number_cell(x) for x in _amplitudes(drives.get(setting.label)) if drives),
             )
         )
         marked.append(is_best and seeks_best)
     nearest = "the best and those that come nearest to it"
     note = listed_note(len(rows), len(verdict.settings), "settings", nearest)
-    return Table(columns, tuple(rows), tuple(marked), note)
+    return Table(heads, tuple(rows), tuple(marked), note)
 
 
 def _p_text(p: float) -> str:
@@ -224,37 +204,45 @@ def _p_text(p: float) -> str:
     return "< 0.001" if p < 0.001 else f"{p:.3f}"
 
 
-def _drive_cells(drive: BoxDrive | None, shaken: bool) -> tuple[Cell, ...]:
-    """Amplitudes of displacement, velocity and acceleration."""
-    if not shaken:
-        return ()
+def _amplitudes(drive: BoxDrive | None) -> tuple[float, ...]:
+    """Of displacement and velocity in mm and mm/s, of acceleration in g."""
     if drive is None:
-        return _number_cells(*[(math.nan, 3)] * 3)
-    return _number_cells(
-        (1e3 * drive.displacement_m, 3), (1e3 * drive.velocity_m_s, 3), (drive.acceleration_g, 3)
-    )
+        return (math.nan,) * 3
+    return 1e3 * drive.displacement_m, 1e3 * drive.velocity_m_s, drive.acceleration_g
 
 
-def _number_cells(*values: tuple[float, int]) -> tuple[Cell, ...]:
-    return tuple(Cell(number(value, digits), str(value)) for value, digits in values)
+def number_cell(value: float, digits: int = 3) -> Cell:
+    """A number with so many digits, sorted by its value."""
+    return Cell(number(value, digits), str(value))
+
+
+def cells(*values: str | float | Cell) -> tuple[Cell, ...]:
+    """A row, or a part of it: texts are sorted as they stand, numbers by their value."""
+    return tuple(map(_cell, values))
+
+
+def _cell(value: str | float | Cell) -> Cell:
+    if isinstance(value, Cell):
+        return value
+    return Cell(value, value) if isinstance(value, str) else number_cell(float(value))
 
 
 _COST = (
-    (GRAINS, "grains", lambda v: f"{v:.0f}"),
+    (columns.GRAINS, "grains", lambda v: f"{v:.0f}"),
     ("elements", "elements", lambda v: f"{v:.0f}"),
     ("particles", "particles", lambda v: f"{v:.0f}"),
-    (SIMULATED_S, "simulated", seconds),
+    (columns.SIMULATED_S, "simulated", seconds),
     (WALL_S, "wall time", seconds),
     (CPU_S, "processor time", seconds),
-    (FILL_CPU_S, "share of its fill", seconds),
-    (GRAIN_STEPS_PER_S, "grain-steps/s", lambda v: f"{number(v / 1e6)} M"),
+    (columns.FILL_CPU_S, "share of its fill", seconds),
+    (columns.GRAIN_STEPS_PER_S, "grain-steps/s", lambda v: f"{number(v / 1e6)} M"),
     ("element_steps_per_s", "element-steps/s", lambda v: f"{number(v / 1e6)} M"),
     ("particle_solves_per_s", "particle-solves/s", lambda v: f"{number(v / 1e6)} M"),
     ("solver_fraction", "time in the solver", lambda v: f"{100 * v:.0f} %"),
-    (PEAK_MEMORY_BYTES, "memory", size),
-    (TIME_STEP_FRACTION, "step / critical", number),
-    (LEAST_LIMIT_S, "least exact limit", lambda v: f"{number(1e6 * v)} µs"),
-    (LARGEST_OVERLAP_FRACTION, "largest overlap", lambda v: f"{100 * v:.1f} %"),
+    (columns.PEAK_MEMORY_BYTES, "memory", size),
+    (columns.TIME_STEP_FRACTION, "step / critical", number),
+    (columns.LEAST_LIMIT_S, "least exact limit", lambda v: f"{number(1e6 * v)} µs"),
+    (columns.LARGEST_OVERLAP_FRACTION, "largest overlap", lambda v: f"{100 * v:.1f} %"),
 )
 
 
@@ -264,13 +252,13 @@ def runs_table(
     """Every run with its parameters, outcome, objective and cost; why one is left out is said."""
     cost = [c for c in _COST if c[0] in summary]
     blocks = [c for c in (REPLICATE, SEED) if c in summary]
-    has_value = verdict.measure in summary
-    columns = (
+    measured = [verdict.measure] if verdict.measure in summary else []
+    heads = (
         Column("run", False),
         *(Column(display_scale(k)[1]) for k in keys),
         *(Column(b) for b in blocks),
         Column("outcome", False),
-        *([Column(display_scale(verdict.measure)[1])] if has_value else []),
+        *(Column(display_scale(m)[1]) for m in measured),
         *(Column(title) for _, title, _ in cost),
     )
     rows, marked = [], []
@@ -279,26 +267,22 @@ def runs_table(
     for row, why in zip(listed.to_dict("records"), reasons, strict=True):
         rows.append(
             (
-                Cell(str(row[RUN]), str(row[RUN]), f"{runs_href}/{quote(str(row[RUN]))}/"),
+                Cell(
+                    str(row[RUN]),
+                    str(row[RUN]),
+                    f"{runs_href}/{quote(str(row[RUN]))}/",
+                ),
                 *(_parameter_cell(row[k], display_scale(k)[0]) for k in keys),
                 *(_parameter_cell(row[b]) for b in blocks),
                 Cell(str(row[OUTCOME]), str(row[OUTCOME]), note=_why(row, why)),
-                *(
-                    [_value_cell(display_scale(verdict.measure)[0] * _float(row[verdict.measure]))]
-                    if has_value
-                    else []
-                ),
+                *(number_cell(display_scale(m)[0] * _float(row[m]), 4) for m in measured),
                 *(_cost_cell(row[name], show) for name, _, show in cost),
             )
         )
         marked.append(bool(why))
     failed_and_best = "those without a value and then the best; summary.tsv has all"
     note = listed_note(len(rows), len(summary), "runs", failed_and_best)
-    return Table(columns, tuple(rows), tuple(marked), note)
-
-
-def _value_cell(value: Any) -> Cell:
-    return Cell(number(_float(value), 4), str(_float(value)))
+    return Table(heads, tuple(rows), tuple(marked), note)
 
 
 def _parameter_cell(value: Any, factor: float = 1.0) -> Cell:
@@ -322,8 +306,8 @@ def _float(value: Any) -> float:
 
 def _why(row: Mapping[Any, Any], why: str) -> str:
     """Why a run is left out, with what the engine or the collection said."""
-    detail = row[DETAIL] if isinstance(row[DETAIL], str) else ""
-    code = _float(row[OUTCOME_CODE])
+    detail = row[columns.DETAIL] if isinstance(row[columns.DETAIL], str) else ""
+    code = _float(row[columns.OUTCOME_CODE])
     if why != NOT_FINISHED:
         meaning = f"{why_unused(why).capitalize()}." if why else ""
     elif math.isfinite(code):

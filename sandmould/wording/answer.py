@@ -405,12 +405,9 @@ class AnswerWords:
     @property
     def stand_in_sections(self) -> str:
         """What the placeholder values belong to."""
-        return listed(sorted({self._section(key) for key in self.answer.stand_ins}))
-
-    @staticmethod
-    def _section(key: str) -> str:
-        section = key.partition(".")[0]
-        return "initial temperatures" if section == "initial_k" else name_of(section)
+        sections = (key.partition(".")[0] for key in self.answer.stand_ins)
+        told = {"initial temperatures" if s == "initial_k" else name_of(s) for s in sections}
+        return listed(sorted(told))
 
     @property
     def stand_in_of(self) -> str:

@@ -17,15 +17,7 @@ from sandmould.statistics.verdict import Verdict
 
 
 def scatter_grounds(verdict: Verdict, differ_in: str, seeks_best: bool) -> tuple[Note, ...]:
-    """Say how much replicates differ.
-
-    Parameters
-    ----------
-    differ_in : str
-        What the replicates of a setting do not share.
-    seeks_best : bool
-        Whether the two best settings are to be compared.
-    """
+    """Say how much replicates differ; ``differ_in``: what those of a setting do not share."""
     used = [s for s in verdict.settings if s.n]
     as_share = verdict.is_wide
     sds = [s.sd / (s.mean if as_share else 1.0) for s in used if math.isfinite(s.sd)]

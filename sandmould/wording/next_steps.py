@@ -10,13 +10,7 @@ from sandmould.definition.certificate import frequency_key
 from sandmould.definition.study import Study
 from sandmould.kinds.sand.kind import SandStudy
 from sandmould.kinds.sand.narrow import Narrow
-from sandmould.runs.formatting import (
-    filled_space,
-    listed,
-    name_of,
-    value_text,
-    with_article,
-)
+from sandmould.runs.formatting import filled_space, listed, name_of, value_text, with_article
 from sandmould.runs.templates import worded
 from sandmould.statistics.answer import Answer, Decided
 from sandmould.statistics.config import fewest_points
@@ -62,12 +56,7 @@ def step(name: str, line: str = "", command: str = "", **values: object) -> Next
 def with_file(steps: Sequence[NextStep], owner: str | None, shipped: str, name: str) -> NextSteps:
     """Say which file the lines of steps belong in.
 
-    Parameters
-    ----------
-    owner : str or None
-        The user's file of the study; None where nobody knows it.
-    shipped : str
-        Name of the shipped study that it is; empty where it is the user's.
+    ``owner``: the user's file of the study, if known; ``shipped``: the shipped study that it is.
     """
     file = OWN_FILE if shipped or owner is None else owner
     below = f" a file {file} below based_on: {shipped or name}"
@@ -225,21 +214,12 @@ def optimum_steps(
     return steps
 
 
-def agreement_steps(is_sound: bool) -> list[NextStep]:
-    """What a comparison of settings that should agree asks for."""
-    return [step("take_cheapest" if is_sound else "differ")]
-
-
 def certificate_steps(study: Study, answer: Answer) -> list[NextStep]:
     """The controls of a best frequency, where none were asked for."""
     is_best = answer.best is not None and study.seeks_best
     is_swept = study.sweep.number_of_points > 1 and frequency_key(study.sweep)
-    if (
-        not isinstance(study, SandStudy)
-        or not is_best
-        or not is_swept
-        or study.certificate.controls
-    ):
+    is_open = is_best and is_swept and not study.certificate.controls
+    if not isinstance(study, SandStudy) or not is_open:
         return []
     fewest = fewest_points(1)
     if study.sweep.number_of_points < fewest:

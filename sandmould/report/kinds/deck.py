@@ -3,9 +3,9 @@
 from __future__ import annotations
 
 from sandmould.kinds.deck.own.computation import WENT_ON
+from sandmould.report.curves import curve_figures, measure_curves
 from sandmould.report.kinds.kind import Findings, KindPages, KindReport
 from sandmould.report.method import deck_method
-from sandmould.report.time_series import curve_figures, measure_curves
 from sandmould.runs.columns import DETAIL
 from sandmould.scenario.own_deck import OwnDeck
 from sandmould.study.collect import Collected

@@ -13,7 +13,6 @@ from pathlib import Path
 import numpy as np
 import pandas as pd
 from matplotlib import colormaps
-from matplotlib.axes import Axes
 from matplotlib.colors import to_hex
 from matplotlib.figure import Figure
 from numpy.typing import NDArray
@@ -33,18 +32,13 @@ from sandmould.drawing.animation import evenly
 from sandmould.drawing.figure_files import numbered, pictures
 from sandmould.drawing.figures import png
 from sandmould.drawing.flow_film import SHADES, make_flow_film
-from sandmould.report.flow_charts import (
-    condition_text,
-    pressure_history,
-    said_of,
-    stability_map,
-)
-from sandmould.report.kinds.kind import Findings, FirstPicture, KindPages, KindReport
-from sandmould.report.tables import Cell, Column, Table
-from sandmould.report.time_series import measure_curves
+from sandmould.report import flow_charts
+from sandmould.report.curves import measure_curves
+from sandmould.report.kinds.kind import Findings, KindPages, KindReport
+from sandmould.report.tables import Cell, Column, ReportPicture, Table, cells, number_cell
 from sandmould.runs.columns import CLASSIFICATION, DETAIL, HOPS, OUTCOME_CODE, RUN
-from sandmould.runs.formatting import name_of, number, setting_text
-from sandmould.runs.templates import Note, notes, sentences, worded
+from sandmould.runs.formatting import name_of, setting_text
+from sandmould.runs.templates import notes, sentences, worded
 from sandmould.scenario.casting.flow import MetalFlow, PouredMetal, StillTank
 from sandmould.study.collect import Collected
 from sandmould.wording.next_steps import NextStep
@@ -59,7 +53,6 @@ COLOURS = tuple(to_hex(colormaps["viridis"](shade / SHADES)) for shade in range(
 class _PicturedRun:
     """A run that is drawn."""
 
-    run: str
     label: str
     folder: Path
     verdict: str
@@ -92,12 +85,15 @@ def _pages(findings: Findings[MetalFlow], film_budget_bytes: int) -> KindPages:
     filmed = [pictured[0], pictured[-1]][: min(FILMED, len(pictured))] if pictured else []
     hopping = _hopping(scenario, ranked, keys)
     measures = [*(f"{name}_pa" for name in ideal_pa), "largest_speed_m_s"]
-    stable = stability_map(ranked, keys)
+    stable = flow_charts.stability_map(ranked, keys)
     fields = _fields(pictured, highest_pa)
-    histories = [pressure_history(run.folder, run.label, run.verdict, ideal_pa) for run in pictured]
+    histories = [
+        (it, flow_charts.pressure_history(it.folder, it.label, it.verdict, ideal_pa))
+        for it in pictured
+    ]
     films = [
         make_flow_film(
-            _load(run.folder), run.run, f"{run.label}: {run.verdict}", highest_pa,
+            _load(run.folder), run.folder.name, f"{run.label}: {run.verdict}", highest_pa,
             film_budget_bytes // len(filmed),
         )
         for run in filmed
@@ -115,13 +111,24 @@ def _pages(findings: Findings[MetalFlow], film_budget_bytes: int) -> KindPages:
     }
     return KindPages(
         "flow.html",
-        _method(scenario, keys),
+        notes(
+            "flow_method.j2",
+            flow=scenario,
+            case=scenario.case,
+            papers=PAPERS,
+            gravity_m_s2=G_M_S2,
+            scheme=scene.scheme_of(scenario),
+            collides_as_swept="collision_distance" in keys,
+            quiet_pa=QUIET_PA,
+            most_off=MOST_OFF,
+            swept=[name_of(key) for key in keys],
+        ),
         context={"pages": shown},
         figures={
             **pictures(stability_map=stable, fields=fields),
-            **numbered("histories", (history.chart for history in histories)),
+            **numbered("histories", (chart for _, chart in histories)),
         },
-        picture=_first_picture(pictured[:1], highest_pa),
+        picture=_first_picture(pictured[0], highest_pa) if pictured else None,
         answer=next(iter(hopping), "") or _calm(scenario, ranked, keys),
         grounds=notes(
             "flow_grounds.j2",
@@ -137,13 +144,11 @@ def _pages(findings: Findings[MetalFlow], film_budget_bytes: int) -> KindPages:
     )
 
 
-def _first_picture(calmest: Sequence[_PicturedRun], highest_pa: float) -> FirstPicture | None:
-    """The metal at the end of the calmest run; None where no run has left fields."""
-    for run in calmest:
-        alt = f"Particles of run {run.run} at its end, coloured by pressure"
-        caption = f"{run.label}, at its end, coloured by pressure."
-        return FirstPicture(_fields([run], highest_pa), alt, caption)
-    return None
+def _first_picture(run: _PicturedRun, highest_pa: float) -> ReportPicture:
+    """The metal at the end of the calmest run."""
+    alt = f"Particles of run {run.folder.name} at its end, coloured by pressure"
+    caption = f"{run.label}, at its end, coloured by pressure."
+    return ReportPicture(_fields([run], highest_pa), alt, caption)
 
 
 def _ranked(scenario: MetalFlow, summary: pd.DataFrame) -> pd.DataFrame:
@@ -169,8 +174,8 @@ def _pictured_runs(
     for _, row in ranked.iterrows():
         folder = study_folder / "runs" / str(row[RUN])
         if (folder / "fields.npz").is_file():
-            label = condition_text({key: row[key] for key in keys})
-            drawable.append(_PicturedRun(folder.name, label, folder, str(row[CLASSIFICATION])))
+            label = flow_charts.condition_text({key: row[key] for key in keys})
+            drawable.append(_PicturedRun(label, folder, str(row[CLASSIFICATION])))
     return [drawable[place] for place in evenly(len(drawable), PICTURED_RUNS).tolist()]
 
 
@@ -234,7 +239,7 @@ def _hopping(scenario: MetalFlow, ranked: pd.DataFrame, keys: Sequence[str]) -> 
     ended = ranked[ranked[CLASSIFICATION] != StabilityRating.FAILED.value]
     at = {
         hops: [
-            condition_text({key: row[key] for key in keys})
+            flow_charts.condition_text({key: row[key] for key in keys})
             for _, row in ended[ended[HOPS] == hops].iterrows()
         ]
         for hops in (0, 1)
@@ -248,34 +253,28 @@ def _noise(scenario: MetalFlow, ranked: pd.DataFrame, keys: Sequence[str]) -> Ta
     deepest = scene.deepest(scenario)
     is_papers = scenario.case == StillTank() and scenario.metal == PouredMetal()
     said = [
-        said_of({key: row[key] for key in keys}) if is_papers else ""
+        flow_charts.said_of({key: row[key] for key in keys}) if is_papers else ""
         for _, row in ranked.iterrows()
     ]
-    columns = [Column("setting", False), Column("verdict", False)]
-    value_columns: list[tuple[str, int]] = []
+    measured = []
     for name in names:
-        columns += [Column(f"{name}: mean, Pa"), Column(f"{name}: deviation, Pa")]
-        value_columns += [(f"{name}_mean_pa", 4), (f"{name}_sd_pa", 3)]
+        measured.append((f"{name}: mean, Pa", f"{name}_mean_pa", 4))
+        measured.append((f"{name}: deviation, Pa", f"{name}_sd_pa", 3))
     window = f"{name_of(deepest)}: deviation of {1e3 * NOISE_WINDOW_S:g} ms means, Pa"
-    columns += [Column(window), Column("fastest, m/s"), Column("mean speed, m/s")]
-    value_columns += [
-        (f"{deepest}_window_sd_pa", 3),
-        ("peak_speed_m_s", 2),
-        ("average_speed_m_s", 2),
-    ]
+    measured.append((window, f"{deepest}_window_sd_pa", 3))
+    measured.append(("fastest, m/s", "peak_speed_m_s", 2))
+    measured.append(("mean speed, m/s", "average_speed_m_s", 2))
+    columns = [Column("setting", False), Column("verdict", False)]
+    columns += [Column(title) for title, _, _ in measured]
     if any(said):
         columns.append(Column("paper's text", False))
     rows = []
     for (_, row), text in zip(ranked.iterrows(), said, strict=True):
-        label = condition_text({key: row[key] for key in keys})
+        label = flow_charts.condition_text({key: row[key] for key in keys})
         note = str(row[DETAIL]) if str(row[DETAIL]) != "nan" else ""
-        cells = [Cell(label, label), Cell(str(row[CLASSIFICATION]), str(row["rank"]), note=note)]
-        values = [float(row.get(column, np.nan)) for column, _ in value_columns]
-        cells += [
-            Cell(number(value, digits), str(value))
-            for value, (_, digits) in zip(values, value_columns, strict=True)
-        ]
-        rows.append((*cells, Cell(text, text)) if any(said) else tuple(cells))
+        verdict = Cell(str(row[CLASSIFICATION]), str(row["rank"]), note=note)
+        values = (number_cell(float(row.get(of, np.nan)), digits) for _, of, digits in measured)
+        rows.append(cells(label, verdict, *values, *([text] if any(said) else [])))
     failed = tuple(c == StabilityRating.FAILED.value for c in ranked[CLASSIFICATION])
     return Table(tuple(columns), tuple(rows), failed)
 
@@ -284,7 +283,13 @@ def _fields(runs: Sequence[_PicturedRun], highest_pa: float) -> str:
     """Pressure over the particles at the end of each run, as the paper's figures 3 and 8."""
     if not runs:
         return ""
-    figure, panels = _grid(len(runs), 4.2)
+    across = min(len(runs), 3)
+    rows = -(-len(runs) // across)
+    size = (1.0 + 3.4 * across, 4.2 * rows + 0.6)
+    figure = Figure(figsize=size, dpi=100, layout="constrained")
+    panels = list(figure.subplots(rows, across, squeeze=False).ravel())
+    for axes in panels[len(runs) :]:
+        axes.set_axis_off()
     for axes, run in zip(panels, runs, strict=False):
         fields = _load(run.folder)
         last = frame_of(fields, len(fields["count"]) - 1)
@@ -292,37 +297,8 @@ def _fields(runs: Sequence[_PicturedRun], highest_pa: float) -> str:
         heading = f"{run.label}\n{run.verdict}, {last.time_s:.3g} s"
         axes.set_title(heading, fontsize=8, parse_math=False)
         axes.tick_params(labelsize=8)
-    figure.colorbar(discs, ax=panels, label="pressure, Pa", shrink=0.6, extend="max")
+    figure.colorbar(discs, ax=panels[: len(runs)], label="pressure, Pa", shrink=0.6, extend="max")
     return png(figure)
-
-
-def _grid(count: int, height: float) -> tuple[Figure, list[Axes]]:
-    """A figure of so many panels, three in a row."""
-    across = min(count, 3)
-    rows = -(-count // across)
-    figure = Figure(
-        figsize=(1.0 + 3.4 * across, height * rows + 0.6), dpi=100, layout="constrained"
-    )
-    panels = figure.subplots(rows, across, squeeze=False).ravel()
-    for axes in panels[count:]:
-        axes.set_axis_off()
-    return figure, list(panels[:count])
-
-
-def _method(scenario: MetalFlow, keys: Sequence[str]) -> tuple[Note, ...]:
-    """How the runs were computed; see ``sand_method``."""
-    return notes(
-        "flow_method.j2",
-        flow=scenario,
-        case=scenario.case,
-        papers=PAPERS,
-        gravity_m_s2=G_M_S2,
-        scheme=scene.scheme_of(scenario),
-        collides_as_swept="collision_distance" in keys,
-        quiet_pa=QUIET_PA,
-        most_off=MOST_OFF,
-        swept=[name_of(key) for key in keys],
-    )
 
 
 REPORT = KindReport(_pages, _notes)

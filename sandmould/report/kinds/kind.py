@@ -13,24 +13,14 @@ from sandmould.definition.study import Study
 from sandmould.drawing.chart import Chart
 from sandmould.kinds.kind import ScenarioT
 from sandmould.report.bed_mode import BedMode
-from sandmould.report.pictured_runs import Heap
 from sandmould.report.robustness import RobustnessPages
+from sandmould.report.tables import ReportPicture
 from sandmould.runs.templates import Note
 from sandmould.scenario.drive import BoxDrive
 from sandmould.statistics.answer import Answer
 from sandmould.statistics.verdict import Verdict
 from sandmould.study.collect import Collected
 from sandmould.wording.next_steps import NextStep
-
-
-@dataclass(frozen=True)
-class FirstPicture:
-    """What the first screen shows of the setting that it names."""
-
-    address: str
-    """A ``data:`` address."""
-    alt: str
-    caption: str
 
 
 @dataclass(frozen=True)
@@ -46,7 +36,8 @@ class KindPages:
     """What the template is given beside what all are given."""
     figures: Mapping[str, Chart | bytes] = field(default_factory=dict)
     """What is written as files too, by name."""
-    picture: FirstPicture | None = None
+    picture: ReportPicture | None = None
+    """What the first screen shows of the setting that it names."""
     beside: Mapping[str, str] = field(default_factory=dict)
     """Scripts for the folder ``SPHERES`` beside the page, by file name."""
     answer: str = ""
@@ -82,11 +73,6 @@ class Findings(Generic[ScenarioT]):
     notes: tuple[str, ...]
     """What the simulation leaves open."""
 
-    @property
-    def scenarios(self) -> Mapping[str, ScenarioT]:
-        """A scenario of each of these settings, by its label."""
-        return {label: scenario for label, (scenario, _) in self.by_setting.items()}
-
 
 @dataclass(frozen=True)
 class KindReport:
@@ -103,5 +89,5 @@ class KindReport:
     """What its controls say."""
     mode: Callable[[Findings[Any]], BedMode | None] = lambda _: None
     """First mode of the bed, for a frequency."""
-    heaps: Callable[[Path, pd.DataFrame, Verdict, Any], tuple[Heap, ...]] = lambda *_: ()
+    heaps: Callable[[Path, pd.DataFrame, Verdict, Any], tuple[ReportPicture, ...]] = lambda *_: ()
     """Pictures of what was measured, as ``steepest_heaps``."""

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from typing import Any
 
 import pandas as pd
@@ -10,16 +11,16 @@ from sandmould.drawing.chart import Chart
 from sandmould.drawing.figure_files import pictures, strip
 from sandmould.kinds.sand.narrow import narrow_spaces
 from sandmould.report.bed_mode import bed_mode
-from sandmould.report.drive import drive_of
+from sandmould.report.curves import curve_figures
 from sandmould.report.filling import FillingPages, filling_pages
 from sandmould.report.grain_size import grain_size_pages
-from sandmould.report.kinds.kind import Findings, FirstPicture, KindPages, KindReport
+from sandmould.report.kinds.kind import Findings, KindPages, KindReport
 from sandmould.report.loose_sand import loose_sand_pages
 from sandmould.report.method import measured_when, sand_method
 from sandmould.report.repose_figures import steepest_heaps
 from sandmould.report.robustness import robustness_pages
 from sandmould.report.sand import film_scene, sand_pages
-from sandmould.report.time_series import curve_figures
+from sandmould.report.tables import ReportPicture
 from sandmould.runs.columns import (
     LEAST_LIMIT_S,
     OVERLAP_P99_FRACTION,
@@ -30,6 +31,7 @@ from sandmould.runs.columns import (
 )
 from sandmould.runs.formatting import number, setting_text
 from sandmould.runs.templates import worded
+from sandmould.scenario.drive import DISPLACEMENT, BoxDrive, laid_down_drive
 from sandmould.scenario.hardness import DEEP_OVERLAP, LEAST_KAPPA, bed_hardness
 from sandmould.scenario.scenario import Scenario
 from sandmould.statistics.verdict import Verdict
@@ -51,6 +53,21 @@ def _notes(
     return (*_steps_above_limit(collected.summary), *notes)
 
 
+def drive_of(scenario: Scenario, runs: pd.DataFrame) -> BoxDrive | None:
+    """Drive of the first vibration of a setting; None where there is none, or none was measured.
+
+    ``runs``: rows of the summary at the setting: a table on mounts moves as it was measured.
+    """
+    if not scenario.vibrations:
+        return None
+    stage = scenario.vibrations[0]
+    if stage.unbalance is None:
+        return laid_down_drive(stage)
+    measured = runs.loc[finished(runs), DISPLACEMENT] if DISPLACEMENT in runs else pd.Series()
+    displacement_m = float(pd.to_numeric(measured).mean())
+    return BoxDrive(stage.frequency_hz, displacement_m) if math.isfinite(displacement_m) else None
+
+
 def _pages(findings: Findings[Scenario], film_budget_bytes: int) -> KindPages:
     """See ``KindPages``."""
     folder, study, scenario = findings.study_folder, findings.study, findings.scenario
@@ -69,6 +86,7 @@ def _pages(findings: Findings[Scenario], film_budget_bytes: int) -> KindPages:
     surfaces = [loose["surface"]] if loose and loose["surface"] else []
     best = verdict.best.label if verdict.best else ""
     grain_size = grain_size_pages(study, collected, scenario, best) if verdict.best else None
+    by_setting = {label: own for label, (own, _) in findings.by_setting.items()}
     pages["film_scene"] = film_scene(scenario, pages["height_m"], surfaces)
     return KindPages(
         "sand.html",
@@ -91,7 +109,7 @@ def _pages(findings: Findings[Scenario], film_budget_bytes: int) -> KindPages:
         _first_picture(pages, verdict, of_sweep),
         pages["beside"],
         grounds=sand_grounds(
-            scenario, study, verdict, findings.scenarios, grain_size.short if grain_size else ()
+            scenario, study, verdict, by_setting, grain_size.short if grain_size else ()
         ),
         at_last=None if grain_size else coarse_step(study, scenario.sand.size_scale),
         steps=tuple(narrow_steps(study, findings.answer, narrow_spaces(scenario))),
@@ -101,7 +119,7 @@ def _pages(findings: Findings[Scenario], film_budget_bytes: int) -> KindPages:
 
 def _first_picture(
     pages: dict[str, Any], verdict: Verdict, collected: Collected
-) -> FirstPicture | None:
+) -> ReportPicture | None:
     """The sand at its end; None without a snapshot."""
     if not pages["panels"]:
         return None
@@ -110,7 +128,7 @@ def _first_picture(
     values = {key: of_run.iloc[0][key] for key in collected.keys}
     said = f"the sand coloured by layer of fill, {last['heading']}."
     caption = f"{setting_text(values)}: {said}" if values else said.capitalize()
-    return FirstPicture(last["by_layer"], last["alt"], caption)
+    return ReportPicture(last["by_layer"], last["alt"], caption)
 
 
 def _steps_above_limit(summary: pd.DataFrame) -> tuple[str, ...]:

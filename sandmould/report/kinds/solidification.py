@@ -13,17 +13,17 @@ import numpy as np
 import pandas as pd
 
 from sandmould.definition.sweep import Point
-from sandmould.drawing.chart import PLAIN, Chart, Line, Mark, tints
+from sandmould.drawing.chart import PLAIN, Chart, Line, LineStyle, Mark, tints
 from sandmould.drawing.figure_files import numbered, pictures
-from sandmould.drawing.sphere_film import bare_film
+from sandmould.drawing.sphere_film import SphereFilm
 from sandmould.kinds.solidification.kind import SolidificationStudy
 from sandmould.report.cast_fields import cast_fields, cast_scene
-from sandmould.report.kinds.kind import Findings, FirstPicture, KindPages, KindReport
-from sandmould.report.tables import Cell, Column, Table
-from sandmould.report.time_series import curve_figures, measure_curves
+from sandmould.report.curves import curve_figures, measure_curves
+from sandmould.report.kinds.kind import Findings, KindPages, KindReport
+from sandmould.report.tables import Cell, Column, ReportPicture, Table, cells
 from sandmould.runs.columns import CPU_S, DETAIL, RUN, SOLIDIFICATION_TIME_S, TIME_S, finished
 from sandmould.runs.formatting import is_number, listed, name_of, number, seconds, setting_text
-from sandmould.runs.templates import Note, notes, worded
+from sandmould.runs.templates import notes, worded
 from sandmould.scenario.casting.solidification import Solidification
 from sandmould.scenario.units import ZERO_K
 from sandmould.statistics.answer import Answer
@@ -77,13 +77,14 @@ def _pages(findings: Findings[Solidification], film_budget_bytes: int) -> KindPa
     cheapest = "" if study.seeks_best else _cheapest(errors, reference, collected)
     is_one = len(said) > 1 and not keys and not study.seeks_best
     first_said = [text for text in said if text.partition(":")[0] in _FIRST]
+    texts = [text.partition(": ")[2] for text in first_said]
     if keys:
         said = _said_of(collected.summary, run, keys, said)
     stand_ins = _stand_ins(findings.answer.stand_ins)
     shown = {
         "pictured_run": run,
         "scene": cast_scene(folder, scenario, fed) if fed else None,
-        "films": (bare_film(run),),
+        "films": (SphereFilm(run=run),),
         "fields": fields,
         "sentences": stand_ins,
         "tables": tables,
@@ -96,16 +97,18 @@ def _pages(findings: Findings[Solidification], film_budget_bytes: int) -> KindPa
     }
     return KindPages(
         "solidification.html",
-        _method(scenario, keys),
+        notes("freezing_method.j2", heat=scenario, swept=[name_of(key) for key in keys]),
         context={"pages": shown},
         figures={
             **pictures(fields=fields),
             **numbered("error_cost", error_cost),
             **curve_figures([*([cooling] if cooling else []), *curves]),
         },
-        picture=FirstPicture(*first) if first[0] else None,
+        picture=ReportPicture(*first) if first[0] else None,
         findings=tuple(t for t in said if t not in first_said) if is_one else said,
-        answer=_of_one(findings, first_said) if is_one else cheapest,
+        answer=worded("cast_answer.j2", it=AnswerWords(findings.answer), said=texts)
+        if is_one
+        else cheapest,
         grounds=notes(
             "casting_grounds.j2",
             has_stand_ins=bool(stand_ins),
@@ -125,12 +128,6 @@ def _said_of(
         return tuple(said)
     label = setting_text({key: row.iloc[0][key] for key in keys})
     return (f"{name}, with {label}{colon}{rest}", *said[1:])
-
-
-def _of_one(findings: Findings[Solidification], said: Sequence[str]) -> str:
-    """The answer of a study of one run, from what is said of it under names."""
-    texts = [text.partition(": ")[2] for text in said]
-    return worded("cast_answer.j2", it=AnswerWords(findings.answer), said=texts)
 
 
 def _longer(summary: pd.DataFrame) -> tuple[NextStep, ...]:
@@ -210,16 +207,8 @@ def _cooling(run: str, curves: pd.DataFrame, scenario: Solidification) -> Chart 
         for of, own in curves.groupby(RUN):
             xy = own[[TIME_S, f"{name}_k"]].to_numpy(dtype=np.float64) - [0.0, ZERO_K]
             xy = xy[:: max(1, len(xy) // MOST_POINTS)]
-            own_line = of == run
-            lines.append(
-                Line(
-                    xy,
-                    tint,
-                    "mean" if own_line else "behind",
-                    name if own_line else "",
-                    f"{name}, {of}",
-                )
-            )
+            style: LineStyle = "mean" if of == run else "behind"
+            lines.append(Line(xy, tint, style, name if of == run else "", f"{name}, {of}"))
     end_s = float(curves[TIME_S].max())
     for what in ("liquidus", "solidus"):
         at = getattr(scenario.casting, f"{what}_k") - ZERO_K
@@ -309,21 +298,12 @@ def _error_table(errors: Sequence[_Error]) -> Table:
         Column("no."), Column("setting", False), Column("processor time"),
         Column("solidification time, %"), Column("worst cooling curve, %"),
     )  # fmt: skip
-    rows = tuple(
-        (
-            Cell(str(place), str(place)),
-            Cell(error.label, error.label),
-            Cell(seconds(error.cpu_s), str(error.cpu_s)),
-            *(Cell(number(v), str(v)) for v in (error.time_percent, error.curve_percent)),
-        )
-        for place, error in enumerate(errors, start=1)
-    )
-    return Table(columns, rows, (False,) * len(rows))
-
-
-def _method(scenario: Solidification, keys: Sequence[str]) -> tuple[Note, ...]:
-    """How the runs were computed; see ``sand_method``."""
-    return notes("freezing_method.j2", heat=scenario, swept=[name_of(key) for key in keys])
+    rows = []
+    for place, error in enumerate(errors, start=1):
+        cost = Cell(seconds(error.cpu_s), str(error.cpu_s))
+        off = error.time_percent, error.curve_percent
+        rows.append(cells(str(place), error.label, cost, *off))
+    return Table(columns, tuple(rows), (False,) * len(rows))
 
 
 REPORT = KindReport(_pages, _notes)

@@ -28,23 +28,23 @@ def test_four_settings_stay_one_chart() -> None:
 def test_each_setting_stands_before_all_others_on_the_same_axes() -> None:
     made = small_multiples(chart(6))
     assert made is not None
-    assert [panel.title for panel in made.panels] == [f"{10 * n} Hz" for n in range(6)]
+    assert [title for title, _ in made.panels] == [f"{10 * n} Hz" for n in range(6)]
     assert made.note == ""
-    for panel in made.panels:
-        *behind, run, mean = [laid.line for laid in panel.laid.lines]
+    for title, panel in made.panels:
+        *behind, run, mean = [laid.line for laid in panel.lines]
         assert [line.style for line in behind] == ["behind"] * 6
-        assert (run.group, mean.group, mean.style) == (panel.title, panel.title, "mean")
+        assert (run.group, mean.group, mean.style) == (title, title, "mean")
         assert not any(line.label for line in (*behind, run, mean))
-        assert (panel.laid.width, panel.laid.height) == PANEL
-        assert f"{panel.title}, mean of 3 before all others; it ends at " in panel.laid.chart.alt
-    assert len({(p.laid.x, p.laid.y) for p in made.panels}) == 1
+        assert (panel.width, panel.height) == PANEL
+        assert f"{title}, mean of 3 before all others; it ends at " in panel.chart.alt
+    assert len({(p.x, p.y) for _, p in made.panels}) == 1
 
 
 def test_of_many_settings_some_are_shown_and_that_is_said() -> None:
     made = small_multiples(chart(40))
     assert made is not None
     assert len(made.panels) == MOST_PANELS
-    assert [made.panels[0].title, made.panels[-1].title] == ["0 Hz", "390 Hz"]
+    assert [made.panels[0][0], made.panels[-1][0]] == ["0 Hz", "390 Hz"]
     assert made.note == "Shown are 12 of 40 settings."
 
 

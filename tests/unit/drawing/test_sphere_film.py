@@ -14,7 +14,6 @@ import pytest
 from sandmould.analysis.density import apparent_density
 from sandmould.drawing import sphere_film
 from sandmould.drawing.animation import ABSENT, BUDGET_BYTES
-from sandmould.drawing.figures import DensityScale
 from sandmould.drawing.sphere_film import (
     MOST_BESIDE,
     UNKNOWN,
@@ -25,7 +24,7 @@ from sandmould.drawing.sphere_film import (
 from sandmould.kinds.sand.moments import list_moments
 from tests.unit.report_study import scenario, write_study
 
-SCALE = DensityScale(1000.0, 2000.0)
+SCALE = (1000.0, 2000.0)
 
 
 @pytest.fixture(scope="module")

@@ -9,7 +9,6 @@ import numpy as np
 import pytest
 
 from sandmould.casting.arpm.scene import solids_of
-from sandmould.drawing.figures import DensityScale
 from sandmould.drawing.sphere_film import sphere_frames
 from sandmould.drawing.sphere_scene import sphere_scene
 from sandmould.engines.snapshot import Snapshot
@@ -99,7 +98,7 @@ def test_its_cut_is_drawn_and_the_film_shows_it_bent(tmp_path: Path) -> None:
     picture, said = draw_outlines(tmp_path, scenario)
     assert picture.startswith("data:image/png")
     assert said.endswith("at the end")
-    frames = sphere_frames([snapshot], scenario, "bar", "best", DensityScale(0.0, 1.0))
+    frames = sphere_frames([snapshot], scenario, "bar", "best", (0.0, 1.0))
     film, n = frames.whole, len(snapshot.id)
     assert (film.grains, film.vertices) == (n, len(snapshot.pattern_m))
     bent_m = np.array(film.origin_m) + film.quantum_m * frames.place[:, 0, n:].T

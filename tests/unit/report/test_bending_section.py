@@ -144,7 +144,7 @@ def test_a_loop_that_does_not_hold_is_marked(study: Path) -> None:
     log.write_text(told)
     assert "cycles in 1 of 3 runs" in pages["sentences"][0]
     assert pages["runs"].marked == (True, False, False)
-    assert [c.chart.y_title for c in pages["convergence"]] == [
+    assert [chart.y_title for chart, _ in pages["convergence"]] == [
         "displacement, mm", "energy, J", "share of the residual"
     ]  # fmt: skip
 

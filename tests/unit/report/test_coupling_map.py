@@ -38,8 +38,8 @@ def collected(keys: tuple[str, ...], **columns: Any) -> Collected:
 def test_right_and_wrong_predictions_are_counted() -> None:
     found = coupling_map(collected((MODULUS, FACTOR, WINDOW)), STATES)
     assert found is not None
-    assert found.picture.startswith("data:image/png")
-    assert found.sentence == (
+    assert found["picture"].startswith("data:image/png")
+    assert found["sentence"] == (
         "The limit predicted before the runs is right in 2 of 4: 1 called safe that cycle or "
         "diverge and 1 called unsafe that hold or lag."
     )
@@ -49,7 +49,9 @@ def test_only_fixed_shares_are_counted() -> None:
     schemes = ["fixed", "aitken", "fixed", "fixed", "fixed", "fixed", "fixed"]
     found = coupling_map(collected((MODULUS, FACTOR, SCHEME), **{SCHEME: schemes}), STATES)
     assert found is not None
-    assert found.sentence.startswith("The limit predicted before the runs is right in 2 of 3: 1 ")
+    assert found["sentence"].startswith(
+        "The limit predicted before the runs is right in 2 of 3: 1 "
+    )
 
 
 @pytest.mark.parametrize("keys", [(MODULUS, WINDOW), (FACTOR,)])

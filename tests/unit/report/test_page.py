@@ -13,7 +13,7 @@ import pandas as pd
 import pytest
 
 from sandmould.drawing import figures
-from sandmould.drawing.templates import page_environment
+from sandmould.drawing.figure_files import page_environment
 from sandmould.engines.snapshot import Snapshot
 from sandmould.report.method import provenance_rows
 from sandmould.report.page import LIMIT_BYTES, write_report

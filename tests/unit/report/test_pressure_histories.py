@@ -30,8 +30,8 @@ def test_a_history_has_each_probe_beside_its_hydrostatic_pressure(tmp_path: Path
     table = pd.DataFrame({"time_s": [0.0, 0.1, 0.2], "h30_pa": [0.0, 900.0, 2e6], "h70_pa": 1.0})
     table.to_csv(tmp_path / "series.tsv", sep="\t", index=False)
     history = pressure_history(tmp_path, "5 relaxations", "good", {"h30": 1000.0, "h70": 400.0})
-    pressure, level, _, other = history.chart.lines
+    pressure, level, _, other = history.lines
     assert pressure.xy[:, 1].tolist() == [0.0, 900.0, HIGHEST * 1000.0]
     assert level.xy.tolist() == [[0.0, 1000.0], [0.2, 1000.0]]
     assert (level.style, other.xy[0, 1]) == ("joined", 400.0)
-    assert (history.setting, history.rating) == ("5 relaxations", "good")
+    assert history.alt.endswith("at 5 relaxations: good.")

@@ -9,7 +9,7 @@ import pandas as pd
 import pytest
 
 from sandmould.engines.snapshot import Snapshot
-from sandmould.report.pictured_runs import pictured_runs
+from sandmould.report.curves import pictured_runs
 from sandmould.report.sand import _role_text
 from sandmould.runs.templates import worded
 from sandmould.statistics.verdict import Verdict, compare_settings

@@ -113,7 +113,7 @@ def test_every_kind_says_what_each_measure_means() -> None:
 
 
 def test_pages_are_in_step_with_the_code() -> None:
-    refresh = "run `python -m sandmould.reference.reference` and commit the pages"
+    refresh = "run `python -m sandmould.cli.reference` and commit the pages"
     for path, text in pages().items():
         assert path.read_text(encoding="utf-8") == text, refresh
 
