@@ -97,7 +97,7 @@ def _table(changes: list[GrainChange]) -> Table:
         Column("grains of the study"),
         Column(f"{FACTOR:g} times as large"),
         Column("change, 95 %"),
-        Column(f"foretold {FACTOR:g} times finer, 90 %"),
+        Column(f"predicted {FACTOR:g} times finer, 90 %"),
     )
     rows = tuple(
         (
