@@ -34,7 +34,7 @@ MEASURING = (
         "sections", "solid_fraction", "tube_fill",
     )),
     *(f"sandmould/kinds/sand/{name}.py" for name in (
-        "bending", "drive", "loose", "measure", "moments", "outflow",
+        "bending", "measure", "moments", "outflow",
     )),
 )  # fmt: skip
 STEPPED_COPIES = 8
