@@ -10,8 +10,7 @@ import json
 import time
 from pathlib import Path
 
-from sandmould.execution.jobs import compute_batch
-from sandmould.execution.loading import load_for
+from sandmould.execution.jobs import compute_batch, load_for
 from sandmould.execution.simulate import measure, render, simulate
 from sandmould.module_main import run_main
 from sandmould.study.plan.announcement import announce, prepare

@@ -19,10 +19,9 @@ from multiprocessing.connection import Connection
 from pathlib import Path
 from typing import Any, NamedTuple
 
-from sandmould.execution.spent import note_spent
 from sandmould.module_main import in_a_sentence
 from sandmould.runs.parent import call_process, end_with_parent, print_to
-from sandmould.runs.products import cpu_time_s
+from sandmould.runs.products import cpu_time_s, note_spent
 
 LOADED_FIRST = "SANDMOULD_LOADED_FIRST"
 """Variable of the environment: scenarios of runs whose libraries the server loads."""

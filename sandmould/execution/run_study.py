@@ -25,8 +25,8 @@ from sandmould.execution.locks import let_go
 from sandmould.execution.screen.ending import last_line, trouble
 from sandmould.execution.screen.screen import Screen
 from sandmould.execution.settled import is_settled, note_settled
-from sandmould.execution.spent import note_spent
 from sandmould.execution.stopping import Stopped, run_in_group, until_stopped
+from sandmould.runs.products import note_spent
 from sandmould.study.plan.build_plan import RESULTS, Plan, checked_plan, starts_jobs, writing
 from sandmould.study.plan.grain_check import coarser_text
 from sandmould.study.plan.plan_files import SUMMARY

@@ -13,11 +13,11 @@ from pathlib import Path
 from sandmould import SHIPPED
 from sandmould.definition.run import LAST_MEASURED
 from sandmould.digest import digest
-from sandmould.execution.spent import SPENT_FILE
 from sandmould.plain_file import UNREADABLE, read_plain
 from sandmould.runs.claim import CLAIM_FILE
 from sandmould.runs.files import write_text
 from sandmould.runs.manifest import MANIFEST_FILE, OUTCOME_FILE
+from sandmould.runs.products import SPENT_FILE
 from sandmould.study.plan.announcement import write_files
 from sandmould.study.plan.build_plan import Plan
 from sandmould.study.plan.plan_files import SUMMARY

@@ -15,7 +15,6 @@ from sandmould.definition.run import Run
 from sandmould.execution.cluster.driver import driver_lines
 from sandmould.execution.cluster.queue import Job, Outlook, jobs_of, live_jobs, outlook, queue_lines
 from sandmould.execution.locks import is_locked
-from sandmould.execution.spent import noted_s
 from sandmould.execution.tidy import freed_bytes, orphans
 from sandmould.execution.time_left import TimeLeft
 from sandmould.plain_file import UNREADABLE, read_json
@@ -24,6 +23,7 @@ from sandmould.runs.formatting import size_text
 from sandmould.runs.hashing import scenario_hash
 from sandmould.runs.manifest import change, read_manifest
 from sandmould.runs.outcome import Outcome, RunOutcome
+from sandmould.runs.products import noted_s
 from sandmould.runs.progress import duration_text
 from sandmould.study.plan.announcement import stored_speeds
 from sandmould.study.plan.build_plan import Plan

@@ -30,9 +30,8 @@ from sandmould.kinds.deck.own.thermo import LOGGED, STEP
 from sandmould.kinds.stored_speed import StoredSpeed
 from sandmould.runs.files import write_text
 from sandmould.runs.formatting import display_number, name_of
-from sandmould.runs.parent import end_with_parent, print_to
+from sandmould.runs.parent import end_with_parent, print_to, say
 from sandmould.runs.templates import worded
-from sandmould.runs.words import say
 from sandmould.scenario.own_deck import OwnDeck
 
 FAILED_LOG = "pilot_failed.log"

@@ -12,8 +12,8 @@ from sandmould.bad_input import BadInputError, Problem
 from sandmould.definition.run import FILL
 from sandmould.kinds.kind import AnyScenario, SpeedClass
 from sandmould.kinds.stored_speed import StoredSpeed
+from sandmould.runs.parent import say
 from sandmould.runs.progress import duration_text
-from sandmould.runs.words import say
 from sandmould.study.plan.batches import Batch, mark_done
 from sandmould.study.plan.build_plan import Plan, writing
 from sandmould.study.plan.lacking import WHOLE, Lack, Need, note_lacks
