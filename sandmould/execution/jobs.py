@@ -18,7 +18,13 @@ from typing import Any, TextIO
 from sandmould.definition.run import LAST_MEASURED, Run
 from sandmould.execution.locks import computing
 from sandmould.execution.pool import SERVER_LOST, do, start_server
-from sandmould.execution.simulate import RESTARTABLE_EXIT, measure, render, simulate, write_crash
+from sandmould.execution.simulate import (
+    RESTARTABLE_EXIT,
+    measure_run,
+    render_run,
+    simulate,
+    write_crash,
+)
 from sandmould.kinds.registry import kind_of
 from sandmould.runs.formatting import listed
 from sandmould.runs.manifest import OUTCOME_FILE
@@ -150,13 +156,13 @@ def _do_all(folder: Path, ranks: int, mpi: str) -> int:
     if lack_of(run, folder).need is Need.COMPUTE:
         for old in (OUTCOME_FILE, LAST_MEASURED):
             (folder / old).unlink(missing_ok=True)  # damaged, or of another scenario or deck
-        render(run, folder)
+        render_run(folder, run)
         if status := _simulate(folder, ranks, mpi, run):
             return status
     else:
         print(f"{folder.name}: computed already", file=sys.stderr)
     if lack_of(run, folder).need is not Need.NOTHING:
-        measure(run, folder)
+        measure_run(folder, run)
     return 0
 
 

@@ -16,7 +16,6 @@ from sandmould.execution.cluster.driver import driver_lines
 from sandmould.execution.cluster.queue import Job, Outlook, jobs_of, live_jobs, outlook, queue_lines
 from sandmould.execution.locks import is_locked
 from sandmould.execution.tidy import freed_bytes, orphans
-from sandmould.execution.time_left import TimeLeft
 from sandmould.plain_file import UNREADABLE, read_json
 from sandmould.runs.claim import owner_of
 from sandmould.runs.formatting import size_text
@@ -29,6 +28,7 @@ from sandmould.study.plan.announcement import stored_speeds
 from sandmould.study.plan.build_plan import Plan
 from sandmould.study.plan.lacking import WHOLE, Lack, Need
 from sandmould.study.plan.plan_files import SUMMARY, changed_line, read_run
+from sandmould.study.plan.price import TimeLeft
 from sandmould.study.rounds.round_log import read_rounds
 
 State = Literal["done", "failed", "running", "stopped", "waiting"]

@@ -15,7 +15,6 @@ from sandmould.statistics.evidence import usable_values
 from sandmould.statistics.settings import (
     Comparison,
     Setting,
-    compare,
     is_wide,
     number_blocks,
     setting_of,
@@ -123,7 +122,10 @@ def _ranked(
         return [], (), None
     spread = Spread.of({k: v.map(math.log) for k, v in values.items()} if by_logarithm else values)
     used.sort(key=lambda s: spread.mean(s.label), reverse=better == "larger")
-    comparisons = compare(used[0], used[1:], spread, by_logarithm)
+    comparisons = tuple(
+        Comparison.of(s.label, *spread.compare(used[0].label, s.label), by_logarithm)
+        for s in used[1:]
+    )
     if by_logarithm and not any(c.tested for c in comparisons):
         return _ranked(settings, values, better, by_logarithm=False)
     return used, comparisons, spread

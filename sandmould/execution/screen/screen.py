@@ -16,12 +16,11 @@ from rich.live import Live
 from sandmould.execution.cluster.queue import Job, Outlook, jobs_of, outlook
 from sandmould.execution.screen.run_watch import Ended, Running, RunWatch, failure, file_time_s
 from sandmould.execution.screen.table import StudyView, counts_text, study_table, times_text
-from sandmould.execution.time_left import TimeLeft
 from sandmould.runs.parent import Words
 from sandmould.runs.progress import duration_text
 from sandmould.study.plan.announcement import stored_speeds
 from sandmould.study.plan.build_plan import Plan
-from sandmould.study.plan.price import computed_wall_s
+from sandmould.study.plan.price import TimeLeft, computed_wall_s
 
 if TYPE_CHECKING:
     from sandmould.execution.screen.so_far import SoFar

@@ -16,15 +16,16 @@ from sandmould.runs.files import write_text
 from sandmould.runs.templates import worded
 from sandmould.scenario.quantity import fields_at
 from sandmould.scenario.scenario import Scenario
-from sandmould.statistics.calibration.config import Calibration, TargetSand
-from sandmould.statistics.calibration.information import Worth, worths
 from sandmould.statistics.calibration.posterior import (
     IsoLine,
     OffTheMapError,
     Posterior,
+    Worth,
     iso_line,
     posterior,
+    worths,
 )
+from sandmould.statistics.config import Calibration, TargetSand
 from sandmould.statistics.emulator import Emulator, TooFewRunsError, fit_emulator
 from sandmould.statistics.evidence import usable_values
 

@@ -13,7 +13,7 @@ from sandmould.engines.registry import engine_of
 from sandmould.scenario.box import Tube
 from sandmould.scenario.scenario import FULL_OVERLAP, Scenario
 from sandmould.scenario.vibration import VibrationStage
-from sandmould.statistics.control_case import SPRINGS, ControlCase
+from sandmould.statistics.config import SPRINGS, ControlCase
 from sandmould.statistics.grain_check import FACTOR
 
 SPRING_FACTORS = (0.25, 4.0)
