@@ -24,6 +24,10 @@ def problems(study: Study) -> list[Problem]:
     if compares and not study.equivalence.margins:
         valid = "at least one measure with its margin, such as solid_fraction: 0.005"
         misfits.append(Problem("equivalence.margins", {}, valid))
+    if study.objective.reported_best and len(study.sweep.swept) != 1:
+        values = [best.value for best in study.objective.reported_best]
+        valid = "absent unless one key is swept"
+        misfits.append(Problem("objective.reported_best", values, valid))
     return misfits
 
 

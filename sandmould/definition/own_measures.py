@@ -117,15 +117,7 @@ def names_in(part: ast.expr) -> Iterator[str]:
 
 
 def problems(own: Mapping[str, str], swept: Collection[str]) -> Iterator[Problem]:
-    """List what is wrong with own measures, whatever the scene has.
-
-    Parameters
-    ----------
-    own : mapping of str to str
-        Formula of each, by name.
-    swept : collection of str
-        Swept keys, which are columns too.
-    """
+    """List what is wrong with own measures, whatever the scene has; swept keys are columns too."""
     trees = {}
     for name, formula in own.items():
         try:

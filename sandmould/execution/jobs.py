@@ -74,12 +74,8 @@ def _named(work: str, *given: Any) -> None:
 def compute_run(folder: Path, log: str, ranks: int, mpi: str) -> None:
     """Compute a run whose deck is there; an outcome is written whatever happens.
 
-    Parameters
-    ----------
-    ranks : int
-        MPI ranks; 1 for an engine whose ranks are threads of one process.
-    mpi : str
-        Command that starts ranks, such as ``srun --mpi=pmi2``.
+    ``ranks``: of MPI; 1 for an engine whose ranks are threads of one process. ``mpi``: command that
+    starts them, such as ``srun --mpi=pmi2``.
 
     Raises
     ------

@@ -36,12 +36,8 @@ from sandmould.study.robustness.controls import COARSER
 def run_study(path: Path, options: Sequence[str], opening: str = "") -> int:
     """Compute a study, all its rounds and its robustness checks.
 
-    Parameters
-    ----------
-    options : sequence of str
-        Of Snakemake, such as ``--cores 4`` or ``--workflow-profile profiles/slurm``.
-    opening : str, optional
-        What the last line begins with where all went well.
+    ``options``: of Snakemake, such as ``--cores 4`` or ``--workflow-profile profiles/slurm``;
+    ``opening``: what the last line begins with where all went well.
 
     Returns
     -------
@@ -157,14 +153,10 @@ def _be_snakemake(arguments: Sequence[str], folder: Path) -> None:
 def stated_cores(options: Sequence[str]) -> int | None:
     """Cores, or jobs at a time, as the options of Snakemake state them; None where none does.
 
-    Returns
-    -------
-    int or None
-        All cores of this machine for words such as ``all``.
+    All cores of this machine for words such as ``all``.
     """
     for place, option in enumerate(options):
-        found = _CORES.match(option)
-        if found:
+        if found := _CORES.match(option):
             value = found["value"] or next(iter(options[place + 1 :]), "")
             return int(value) if value.isdecimal() else _all_cores()
     return None

@@ -52,16 +52,9 @@ class RunStatus:
 
 
 def run_status(folder: Path, lack: Lack, live: Collection[str] | None = None) -> RunStatus:
-    """See where a run stands from what it has written.
+    """See where a run stands from what it has written, and what a start would do for it.
 
-    Parameters
-    ----------
-    folder : Path
-        ``results/<study>/runs/<run>``.
-    lack : Lack
-        What a start would do for it.
-    live : collection of str, optional
-        Numbers of the jobs of the cluster that have not ended, where that is known.
+    ``live``: numbers of the jobs of the cluster that have not ended, where that is known.
     """
     name = folder.name
     if lack.need is Need.NOTHING:

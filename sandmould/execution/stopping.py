@@ -37,12 +37,7 @@ class Stopped(BaseException):
 def until_stopped(work: Callable[[], int], name: str) -> int:
     """Do a command's work; at Ctrl-C or kill say that the same command goes on.
 
-    ``work``: gives the exit status.
-
-    Returns
-    -------
-    int
-        The exit status of the work, or that of a shell after the signal.
+    Gives the exit status of the work, or that of a shell after the signal.
     """
     try:
         with _stopping():

@@ -75,12 +75,7 @@ def compare_settings(
     unlike numbers of replicates). Where means differ more than a hundredfold, see ``is_wide``, all
     this is done with the logarithms: the scatter of the large ones would hide the small ones.
 
-    Parameters
-    ----------
-    summary : DataFrame
-        One row a run, from :func:`sandmould.study.collect.collect`.
-    better : {"larger", "smaller", "neither"}
-        Which values are better.
+    ``summary``: one row a run, see ``collect``.
     """
     in_blocks = usable_values(summary, measure).set_axis(number_blocks(summary))
     groups = [(at, len(rows), in_blocks.iloc[rows].dropna()) for at, rows in

@@ -125,12 +125,8 @@ class Submission:
 def open_submission(plan: Plan, arguments: Sequence[str], stated: Mapping[str, Any]) -> Submission:
     """How the jobs of a start go to where its options say.
 
-    Parameters
-    ----------
-    arguments : sequence of str
-        Snakemake's command line.
-    stated : mapping
-        Its default resources, which hold where ``cluster.yaml`` says nothing.
+    ``arguments``: Snakemake's command line; ``stated``: its default resources, which hold where
+    ``cluster.yaml`` says nothing.
 
     Raises
     ------

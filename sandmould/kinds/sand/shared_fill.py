@@ -89,14 +89,8 @@ def _lay_checkpoint(run: Run, source: Path, work: Path, stages: int) -> None:
 def fill_apart(run: Run, folder: Path, program: Program, opening: Opening) -> Computed | None:
     """Compute the fill of a run as a shared fill is computed, and lay its end as a checkpoint.
 
-    So a run ends alike whether it shares its fill or not.
-
-    Parameters
-    ----------
-    run : Run
-        Whose scenario has ``rest.shaken_check_every_s``.
-    opening : callable
-        Opens a session.
+    So a run whose scenario has ``rest.shaken_check_every_s`` ends alike whether it shares its fill
+    or not.
 
     Returns
     -------

@@ -130,14 +130,9 @@ def _calibrate_sand(
 def material_text(
     calibrated: CalibratedSand, keys: tuple[str, str], scenario: Scenario, study: str
 ) -> str:
-    """A calibrated sand as a material file: the study's sand with two values found.
+    """A calibrated sand, which has a posterior, as a material file: with two values found.
 
-    Parameters
-    ----------
-    calibrated : CalibratedSand
-        With a posterior.
-    scenario : Scenario
-        Of any run: all but the swept keys is the same.
+    ``scenario``: of any run: all but the swept keys is the same.
     """
     assert calibrated.posterior is not None
     parts = {"sand", "contact", "background_damping"}

@@ -127,14 +127,7 @@ def expand(
 
 
 def coarser_runs(study: OpenStudy, point: Point, replicates: Iterable[int]) -> list[Run]:
-    """Runs of a point with coarser grains; none where no engine can compute them.
-
-    Parameters
-    ----------
-    study : OpenStudy
-    point : Point
-    replicates : iterable of int
-    """
+    """Runs of a point with coarser grains; none where no engine can compute them."""
     base = study.study.scenario.model_dump(mode="json")
     kind = kind_named(study.study.kind)
     at_point = _AtPoint(study, base, point, Labels(kind.scenario, kind.labels_have_units))

@@ -115,7 +115,6 @@ def study_of(files: Sequence[StudyFile]) -> OpenStudy:
     problems = sweep.problems(study.sweep, study.scenario, study.replicates) or [
         *own_measures.problems(study.own_measures, study.sweep.swept),
         *comparing.problems(study),
-        *_reported(study),
         *study.problems(),
         *comparing.calibration_problems(study.calibration, study.sweep),
         *refinement.problems(
@@ -140,13 +139,6 @@ def _kind(files: Sequence[StudyFile]) -> Kind[Any]:
             valid = f"{below.name}, the kind of {files[n - 1].name}, which this study is based on"
             raise BadInputError([Problem("kind", kind.name, valid, file.name)])
     return kind
-
-
-def _reported(study: Study) -> Iterator[Problem]:
-    """Best values by others need the one key that they are values of."""
-    if study.objective.reported_best and len(study.sweep.swept) != 1:
-        values = [best.value for best in study.objective.reported_best]
-        yield Problem("objective.reported_best", values, "absent unless one key is swept")
 
 
 def study_files(path: Path, text: str | None = None) -> list[StudyFile]:

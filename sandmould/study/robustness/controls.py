@@ -41,12 +41,7 @@ class Case(ControlCase):
 def cases(checks: RobustnessChecks, scenario: Scenario, best_hz: float) -> Iterator[Case]:
     """Cases of all controls of a study.
 
-    Parameters
-    ----------
-    scenario : Scenario
-        Of the study.
-    best_hz : float, Hz
-        The middle frequency, where every amplitude that is held is that of the sweep.
+    ``best_hz``: the middle frequency, where every amplitude that is held is that of the sweep.
     """
     for control in checks.controls:
         if control == "hold":

@@ -59,13 +59,8 @@ def draw_measures(scenario: OwnDeck, folder: Path) -> None:
 def measured(scenario: OwnDeck, series: pd.DataFrame, output: Path) -> pd.DataFrame:
     """Measures by name, one row a row of the log; those that cannot be read are left out.
 
-    Parameters
-    ----------
-    scenario : OwnDeck
-    series : DataFrame
-        Time in s and the columns of the log, see ``computation.series``.
-    output : Path
-        Folder that the deck wrote its dumps into.
+    ``series``: time in s and the columns of the log, see ``computation.series``; ``output``: folder
+    that the deck wrote its dumps into.
     """
     found = {}
     time_s = series["time_s"].to_numpy() if "time_s" in series else np.full(len(series), np.nan)
