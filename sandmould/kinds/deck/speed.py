@@ -24,7 +24,6 @@ from sandmould.digest import SHORT, digest
 from sandmould.engines.registry import engine_module
 from sandmould.kinds.deck.own import computation
 from sandmould.kinds.deck.own import deck as own_deck
-from sandmould.kinds.deck.own.columns import missing_columns
 from sandmould.kinds.deck.own.measures import measured
 from sandmould.kinds.deck.own.thermo import LOGGED, STEP
 from sandmould.kinds.stored_speed import StoredSpeed
@@ -138,7 +137,7 @@ def _computed(scenario: OwnDeck, folder: Path, pilot_s: float) -> tuple[float | 
 def _lacks(scenario: OwnDeck, series: pd.DataFrame) -> str:
     """Say which columns the log of a pilot has not printed yet."""
     logged = [str(name).removeprefix(LOGGED) for name in series]
-    missing = missing_columns(scenario, logged) if len(series) else ""
+    missing = own_deck.missing_columns(scenario, logged) if len(series) else ""
     return f"in its first seconds {missing.rstrip('.')}" if missing else ""
 
 

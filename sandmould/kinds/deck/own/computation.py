@@ -15,8 +15,14 @@ import pandas as pd
 
 from sandmould.engines.registry import deck_reader, engine_module
 from sandmould.engines.session import EngineStop
-from sandmould.kinds.deck.own.columns import missing_columns
-from sandmould.kinds.deck.own.deck import OUTPUT, RESTART_FILES, check_unchanged, names_used, render
+from sandmould.kinds.deck.own.deck import (
+    OUTPUT,
+    RESTART_FILES,
+    check_unchanged,
+    missing_columns,
+    names_used,
+    render,
+)
 from sandmould.kinds.deck.own.measures import missing_dump
 from sandmould.kinds.deck.own.thermo import LOGGED, STEP, Thermo, read_thermo
 from sandmould.plain_file import UNREADABLE, read_json
