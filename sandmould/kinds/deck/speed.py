@@ -26,7 +26,7 @@ from sandmould.kinds.deck.own import computation
 from sandmould.kinds.deck.own import deck as own_deck
 from sandmould.kinds.deck.own.measures import measured
 from sandmould.kinds.deck.own.thermo import LOGGED, STEP
-from sandmould.kinds.stored_speed import StoredSpeed
+from sandmould.kinds.kind import StoredSpeed
 from sandmould.runs.files import write_text
 from sandmould.runs.formatting import display_number, name_of
 from sandmould.runs.parent import end_with_parent, print_to, say

@@ -22,8 +22,7 @@ from sandmould.casting.arpm.estimates import (
     sand_takes_j_m3,
 )
 from sandmould.kinds.casting import CastingPlanning
-from sandmould.kinds.kind import BASE_MEMORY_MB, SpeedClass
-from sandmould.kinds.stored_speed import StoredSpeed
+from sandmould.kinds.kind import BASE_MEMORY_MB, SpeedClass, StoredSpeed
 from sandmould.limits import CELLS, RECORDS
 from sandmould.runs.measures import once, read_groups
 from sandmould.runs.templates import Note, notes

@@ -10,8 +10,7 @@ from typing import Literal
 
 from sandmould.bad_input import BadInputError, Problem
 from sandmould.definition.run import FILL
-from sandmould.kinds.kind import AnyScenario, SpeedClass
-from sandmould.kinds.stored_speed import StoredSpeed
+from sandmould.kinds.kind import AnyScenario, SpeedClass, StoredSpeed
 from sandmould.runs.parent import say
 from sandmould.runs.progress import duration_text
 from sandmould.study.plan.batches import Batch, mark_done
