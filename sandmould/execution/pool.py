@@ -64,14 +64,9 @@ def start_server(folders: Iterable[Path] = ()) -> None:
 def do(work: Callable[..., int | None], *given: Any, log: Path, name: str = "") -> End:
     """Do a piece of work in a process of its own and wait for its end.
 
-    Parameters
-    ----------
-    work : callable
-        A function of a module; gives the exit status, None for 0.
-    log : Path
-        Takes all that it prints, which also goes to standard error.
-    name : str
-        Of the run, which its lines in the log begin with, since several may share it.
+    ``work``: a function of a module; gives the exit status, None for 0. ``log`` takes all that it
+    prints, which also goes to standard error. ``name``: of the run, which its lines in the log
+    begin with, since several may share it.
     """
     start_server()
     reader, writer = _CONTEXT.Pipe(duplex=False)

@@ -53,11 +53,8 @@ def run_study(path: Path, options: Sequence[str], opening: str = "") -> int:
     ``options``: of Snakemake, such as ``--cores 4`` or ``--workflow-profile profiles/slurm``;
     ``opening``: what the last line begins with where all went well.
 
-    Returns
-    -------
-    int
-        Exit status of the last call of Snakemake: not 0 where a run failed, or that of a shell
-        after Ctrl-C or kill.
+    Gives the exit status of the last call of Snakemake: not 0 where a run failed, or that of a
+    shell after Ctrl-C or kill.
 
     Raises
     ------

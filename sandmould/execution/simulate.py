@@ -63,11 +63,8 @@ def simulate(folder: Path, run: Run | None = None) -> int:
 
     ``run``: read from its folder unless given.
 
-    Returns
-    -------
-    int
-        Exit status: 0 when the outcome is written, ``RESTARTABLE_EXIT`` when the run stopped
-        early with a checkpoint.
+    Gives the exit status: 0 when the outcome is written, ``RESTARTABLE_EXIT`` when the run stopped
+    early with a checkpoint.
     """
     run = run or read_run(folder / "scenario.yaml")
     computed = kind_of(run.scenario).execution.compute(run, folder)

@@ -129,12 +129,9 @@ def _ranked(
 def rank_runs(summary: pd.DataFrame, measure: str, better: Better = "larger") -> dict[str, str]:
     """Best, median and worst usable run by the objective.
 
-    Returns
-    -------
-    dict
-        ``best``, ``median`` and ``worst`` to the run's name, ``highest``, ``median`` and
-        ``lowest`` where neither is better; fewer where fewer runs are usable. Of an even number of
-        runs the better of the two middle ones is the median.
+    Gives ``best``, ``median`` and ``worst`` to the run's name, ``highest``, ``median`` and
+    ``lowest`` where neither is better; fewer where fewer runs are usable. Of an even number of runs
+    the better of the two middle ones is the median.
     """
     first, last = ("highest", "lowest") if better == "neither" else ("best", "worst")
     values = usable_values(summary, measure).dropna()
@@ -150,11 +147,8 @@ def rank_runs(summary: pd.DataFrame, measure: str, better: Better = "larger") ->
 def further_replicates(comparisons: Sequence[Comparison], best: Setting) -> int | None:
     """How many more replicates would tell the best from those that it cannot be told from.
 
-    Returns
-    -------
-    int or None
-        Of each of these settings, if their differences are as large as they seem. None where
-        nothing is open, or where too few replicates tell.
+    So many of each of these settings, if their differences are as large as they seem. None where
+    nothing is open, or where too few replicates tell.
     """
     open_ones = [c for c in comparisons if c.tested and not c.separated]
     tests = [c.test for c in open_ones if c.test is not None]

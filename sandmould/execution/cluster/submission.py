@@ -8,13 +8,16 @@ import time
 from collections.abc import Mapping, Sequence
 from typing import Any
 
-from sandmould.execution.cluster.limits import Demand, JobLimits, check_jobs, limits
 from sandmould.execution.cluster.queue import Job, cancel, jobs_of
 from sandmould.execution.cluster.settings import (
     RESOURCES,
     WORD,
     Cluster,
+    Demand,
+    JobLimits,
+    check_jobs,
     goes_to_slurm,
+    limits,
     read_cluster,
 )
 from sandmould.runs.progress import duration_text

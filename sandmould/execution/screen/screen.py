@@ -53,15 +53,9 @@ class Screen:
     ) -> None:
         """Look at what is there.
 
-        Parameters
-        ----------
-        live : bool, optional
-            Whether to draw a table again and again; by default where stderr is a terminal that
-            can.
-        submits : bool
-            Whether runs are computed by jobs of Slurm, on its cores.
-        begun_s : float, optional, s
-            When the command began, on the clock of ``time.monotonic``; now unless it is given.
+        ``live``: whether to draw a table again and again; by default where stderr is a terminal
+        that can. ``submits``: whether runs are computed by jobs of Slurm, on its cores.
+        ``begun_s``: when the command began, on the clock of ``time.monotonic``; now unless given.
         """
         self._folder = results / plan.study.name
         logs = self._folder / "logs"

@@ -86,12 +86,8 @@ class DeckSpeed(StoredSpeed[OwnDeck]):
 def pilot(scenario: OwnDeck, results: Path, pilot_s: float = PILOT_S) -> tuple[float | None, str]:
     """Compute the deck for some seconds in a folder of its own, in one piece and gone on with.
 
-    Parameters
-    ----------
-    scenario : OwnDeck
-        One of several ranks has no pilot.
-    results : Path
-        Folder of all results, which keeps the log of a pilot that failed.
+    A scenario of several ranks has no pilot. ``results``: folder of all results, which keeps the
+    log of a pilot that failed.
 
     Returns
     -------

@@ -233,10 +233,7 @@ def add_drive(scenario: Scenario, table: pd.DataFrame, folder: Path) -> pd.DataF
 
     ``table``: measures of a run's snapshots, in order of time.
 
-    Returns
-    -------
-    DataFrame
-        Gaps before the first vibration; in a rest, the amplitudes of the vibration before it.
+    Gaps stand before the first vibration; in a rest, the amplitudes of the vibration before it.
     """
     if not scenario.vibrations:
         return table

@@ -25,10 +25,7 @@ def lay_fill(run: Run, folder: Path, program: Program) -> Computed | None:
 
     ``folder``: ``results/<study>/runs/<run>``; the fills of the study lie beside the runs.
 
-    Returns
-    -------
-    Computed or None
-        How the run ends where the fill failed: as that did.
+    Gives how the run ends where the fill failed: as that did.
     """
     if not run.fill:
         return None
@@ -92,10 +89,7 @@ def fill_apart(run: Run, folder: Path, program: Program, opening: Opening) -> Co
     So a run whose scenario has ``rest.shaken_check_every_s`` ends alike whether it shares its fill
     or not.
 
-    Returns
-    -------
-    Computed or None
-        How the run ends where its fill did not finish; None once it may vibrate.
+    Gives how the run ends where its fill did not finish; None once it may vibrate.
     """
     work, run_hash = folder / "work", scenario_hash(run.scenario)
     newest, _ = checkpoints.newest_checkpoint(work)

@@ -67,10 +67,7 @@ def prepare(
 
     ``found``: what runs lack; ``plan.lacks`` says so unless it is given.
 
-    Returns
-    -------
-    str
-        Which runs are computed or measured again, and why.
+    Says which runs are computed or measured again, and why.
     """
     folder = results / plan.study.name
     with writing(folder):

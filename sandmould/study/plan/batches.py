@@ -49,15 +49,10 @@ def plan_batches(
     so that runs that are appended later move nothing but the last batch. Where it is known how many
     cores are free, batches are made so much shorter that all cores end together.
 
-    Parameters
-    ----------
-    cores : int
-        That a job should have; runs that leave some of them free are computed side by side. One
-        run under MPI has a job's cores for itself.
-    free_cores : int
-        That jobs find free; 0 where that is not known, as on a cluster.
-    least : int
-        Runs that a batch should have, where it is made shorter.
+    ``cores``: that a job should have; runs that leave some of them free are computed side by side.
+    One run under MPI has a job's cores for itself. ``free_cores``: that jobs find free; 0 where
+    that is not known, as on a cluster. ``least``: runs that a batch should have, where it is made
+    shorter.
     """
     alike: dict[tuple[str, int, int], list[Run]] = {}
     for run in runs:

@@ -338,8 +338,6 @@ def _under_kept_names(runs: Sequence[Run], folder: Path) -> list[Run]:
 
     A name begins with the swept keys, so it changes when a study sweeps one more; it ends with
     the replicate and the hash of the scenario, which stay.
-
-    ``folder``: of the study's results.
     """
     places = folder / "runs"
     there = {path.name for path in places.iterdir()} if places.is_dir() else set()

@@ -59,11 +59,8 @@ def expand(
     measured : bool, optional
         Whether the runs must have the measures that the study asks for; not to draw them.
 
-    Returns
-    -------
-    list of Run
-        Points in the order of the sweep, the replicates of a point together; those of the cross
-        check after those of its point, those of the rounds and of the certificate last.
+    Points come in the order of the sweep, the replicates of a point together; those of the cross
+    check after those of its point, those of the rounds and of the certificate last.
 
     Raises
     ------

@@ -119,9 +119,7 @@ def _wrong_end(scenario: OwnDeck, thermo: Thermo, went_on: bool) -> str:
     """Say that a deck did not end at the step that the study states; empty where it did.
 
     A deck may count its steps anew on the way: unless it went on from a restart file, those of
-    all its runs together may be the stated ones instead.
-
-    ``thermo``: of the last attempt.
+    all its runs together may be the stated ones instead. ``thermo``: of the last attempt.
     """
     if scenario.steps is None or thermo.table.empty:
         return ""

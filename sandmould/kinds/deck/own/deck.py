@@ -169,10 +169,7 @@ def check_unchanged(scenario: OwnDeck, is_rendered: bool = False) -> None:
 
 
 def _column_problems(scenario: OwnDeck, deck: str) -> Iterator[Problem]:
-    """Tell columns that a rendered deck, by its text alone, will not print.
-
-    ``deck``: as the engine reads it at the beginning.
-    """
+    """Tell columns that a rendered deck, by its text alone, will not print."""
     printed = _printed(deck)
     if printed is None:
         return
