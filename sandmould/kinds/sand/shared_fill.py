@@ -67,9 +67,7 @@ def _lay_checkpoint(run: Run, source: Path, work: Path, stages: int) -> None:
     It pays for what it computes itself, and has the steps, the grains and the largest overlap of
     the whole.
     """
-    mark = checkpoints.read_mark(source)
-    if mark.scenario_hash != scenario_hash(run.scenario.before_vibration):
-        raise ValueError("it is of another scenario")
+    mark = checkpoints.read_mark(source, scenario_hash(run.scenario.before_vibration))
     taken = Cost(**mark.cost)
     cost = replace(
         cost_before(run.scenario),

@@ -11,7 +11,7 @@ import pytest
 import yaml
 
 from sandmould.bad_input import BadInputError
-from sandmould.kinds.sand.kind import VibratingTable
+from sandmould.definition.table import VibratingTable
 from sandmould.report.page import _beyond_table
 from sandmould.scenario.drive import BoxDrive
 from sandmould.scenario.vibration import STANDARD_GRAVITY_M_S2
