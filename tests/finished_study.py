@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from pathlib import Path
 
-from sandmould.execution.simulate import measure, render, simulate, write_crash
+from sandmould.execution.simulate import measure_run, render_run, simulate, write_crash
 from sandmould.study.collect import collect
 from sandmould.study.plan.build_plan import RESULTS, Plan, open_plan
 from tests.planned import announce
@@ -58,13 +58,13 @@ def finished_study(path: Path, failed: int = 0) -> Plan:
     folder = RESULTS / plan.study.name
     for place, run in enumerate(plan.runs):
         where = folder / "runs" / run.run
-        render(run, where)
+        render_run(where, run)
         if place < len(plan.runs) - failed:
             assert simulate(where) == 0
         else:
             (where / "work").mkdir()
             write_crash(where, "as this test wants it")
-        measure(run, where)
+        measure_run(where, run)
     collect(folder)
     batches = folder / "batches"
     batches.mkdir(exist_ok=True)

@@ -13,13 +13,13 @@ from scipy.stats import binomtest, chi2
 from benchmarks.calibration.methods import CalibrationMethod, problem_of
 from benchmarks.calibration.oracle import ANGLE, Floats, Map, by_emulator
 from benchmarks.calibration.race import run_race
-from sandmould.statistics.calibration.config import Target
 from sandmould.statistics.calibration.posterior import (
     CREDIBLE,
     OffTheMapError,
     Posterior,
     posterior,
 )
+from sandmould.statistics.config import Target
 from sandmould.statistics.emulator import Emulator, fit_emulator
 
 MEASURED_SD_DEG = 0.5

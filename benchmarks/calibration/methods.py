@@ -21,7 +21,7 @@ from typing import Any, Protocol
 import numpy as np
 
 from benchmarks.calibration.refine import best_guess, design, next_point
-from sandmould.statistics.calibration.config import Target
+from sandmould.statistics.config import Target
 from sandmould.statistics.emulator import TooFewRunsError, fit_emulator
 
 Messages = Generator[dict[str, Any], float | None, None]

@@ -9,7 +9,7 @@ from scipy.special import ndtr
 from scipy.stats import qmc
 
 from sandmould.arrays import Floats
-from sandmould.statistics.calibration.config import Target
+from sandmould.statistics.config import Target
 from sandmould.statistics.emulator import Emulator
 
 

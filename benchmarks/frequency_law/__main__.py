@@ -9,7 +9,7 @@ from __future__ import annotations
 from benchmarks.frame import Benchmark
 from benchmarks.frequency_law import page
 from sandmould import ROOT
-from sandmould.kinds.sand.fill_map import MAP
+from sandmould.kinds.sand.table_motion import MAP
 
 BENCHMARK = Benchmark(
     __file__,

@@ -8,7 +8,7 @@ from pathlib import Path
 from benchmarks.frequency_law.series import FREQUENCY, FillCurve, fill_curve
 from sandmould import ROOT
 from sandmould.runs.columns import CONTROL, PART, SWEEP
-from sandmould.statistics.control_case import SPRINGS
+from sandmould.statistics.config import SPRINGS
 from sandmould.study.collect import read_summary
 from sandmould.study.plan.expand import expand
 from sandmould.study.plan.load_study import open_study

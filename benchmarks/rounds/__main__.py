@@ -14,8 +14,7 @@ import pandas as pd
 
 from benchmarks.frame import table
 from sandmould.module_main import run_main
-from sandmould.statistics.optimum import Optimum, find_optimum
-from sandmould.statistics.propose import propose
+from sandmould.statistics.optimum import Optimum, find_optimum, propose
 
 KEY, MEASURE = "frequency_hz", "fill"
 LOW_HZ, HIGH_HZ = 20.0, 100.0

@@ -10,9 +10,8 @@ import json
 import time
 from pathlib import Path
 
-from sandmould.execution.jobs import compute_batch
-from sandmould.execution.loading import load_for
-from sandmould.execution.simulate import measure, render, simulate
+from sandmould.execution.jobs import compute_batch, load_for
+from sandmould.execution.simulate import measure_run, render_run, simulate
 from sandmould.module_main import run_main
 from sandmould.study.plan.announcement import announce, prepare
 from sandmould.study.plan.build_plan import RESULTS, open_plan
@@ -45,10 +44,10 @@ def _do(folder: Path) -> None:
     """Do what a worker does for one run."""
     run = read_run(folder / "scenario.yaml")
     lack_of(run, folder)
-    render(run, folder)
+    render_run(folder, run)
     (folder / "work").mkdir(exist_ok=True)
     simulate(folder, run)
-    measure(run, folder)
+    measure_run(folder, run)
     lack_of(run, folder)
 
 

@@ -1,4 +1,4 @@
-"""What keeps a study from comparing what it asks to compare."""
+"""What keeps a study from comparing what it asks to compare, and from calibrating."""
 
 from __future__ import annotations
 
@@ -6,10 +6,13 @@ from collections.abc import Iterator
 
 from sandmould.bad_input import Problem
 from sandmould.definition.study import CrossCheck, Study
-from sandmould.definition.sweep import Sweep, points
-from sandmould.statistics.config import FULL, Aim, Equivalence, Objective
+from sandmould.definition.sweep import Range, Sweep, points
+from sandmould.runs.formatting import is_number
+from sandmould.statistics.config import FULL, Aim, Calibration, Equivalence, Objective
 
 ENGINE = "engine.name"
+OF_MATERIAL = ("sand.", "contact.", "background_damping.")
+"""Beginnings of the keys that a material states."""
 
 
 def problems(study: Study) -> list[Problem]:
@@ -21,6 +24,10 @@ def problems(study: Study) -> list[Problem]:
     if compares and not study.equivalence.margins:
         valid = "at least one measure with its margin, such as solid_fraction: 0.005"
         misfits.append(Problem("equivalence.margins", {}, valid))
+    if study.objective.reported_best and len(study.sweep.swept) != 1:
+        values = [best.value for best in study.objective.reported_best]
+        valid = "absent unless one key is swept"
+        misfits.append(Problem("objective.reported_best", values, valid))
     return misfits
 
 
@@ -92,3 +99,29 @@ def _vibration(vibration_s: float, study: Study) -> Iterator[Problem]:
     elif vibration_s > stages[-1].duration_s:
         valid = f"at most {stages[-1].duration_s:g} s, that of the last vibration"
         yield Problem("cross_check.vibration_s", vibration_s, valid)
+
+
+def calibration_problems(calibration: Calibration, sweep: Sweep) -> Iterator[Problem]:
+    """List what is wrong with a calibration whose sweep has no problems."""
+    if not calibration.sands:
+        return
+    keys = sweep.swept
+    if len(keys) != 2:
+        yield Problem("sweep.keys", keys, "exactly two swept keys in a study that calibrates")
+        return
+    for key in keys:
+        values = sweep.keys.get(key, ())
+        stated = [p[key] for p in sweep.points] if sweep.design == "list" else values
+        numeric = isinstance(stated, Range) or all(map(is_number, stated))
+        if not (key.startswith(OF_MATERIAL) and numeric):
+            valid = f"a number of the material: a key that begins with {' or '.join(OF_MATERIAL)}"
+            yield Problem("sweep.keys", key, valid)
+    names = [sand.name for sand in calibration.sands]
+    for i, name in enumerate(names):
+        if name in names[:i]:
+            yield Problem(f"calibration.sands.{i}.name", name, "a name no other sand has")
+    for i, sand in enumerate(calibration.sands):
+        for key in sand.assumed:
+            if key not in keys:
+                valid = f"a swept key, {' or '.join(keys)}"
+                yield Problem(f"calibration.sands.{i}.assumed", key, valid)

@@ -117,15 +117,7 @@ def names_in(part: ast.expr) -> Iterator[str]:
 
 
 def problems(own: Mapping[str, str], swept: Collection[str]) -> Iterator[Problem]:
-    """List what is wrong with own measures, whatever the scene has.
-
-    Parameters
-    ----------
-    own : mapping of str to str
-        Formula of each, by name.
-    swept : collection of str
-        Swept keys, which are columns too.
-    """
+    """List what is wrong with own measures, whatever the scene has; swept keys are columns too."""
     trees = {}
     for name, formula in own.items():
         try:
@@ -172,11 +164,8 @@ def problems_in_scene(own: Mapping[str, str], has: Collection[str]) -> Iterator[
 def with_own_measures(table: pd.DataFrame, own: Mapping[str, str]) -> pd.DataFrame:
     """Add a column for each own measure to a table of measures.
 
-    Returns
-    -------
-    DataFrame
-        A value that cannot be computed is NaN: of a missing column, a division by zero, the root
-        of a negative number, or one beyond all floating-point numbers.
+    A value that cannot be computed is NaN: of a missing column, a division by zero, the root of a
+    negative number, or one beyond all floating-point numbers.
     """
     if not own:
         return table

@@ -15,8 +15,7 @@ from sandmould.limits import REPLICATES
 from sandmould.scenario.engine import EngineName
 from sandmould.scenario.quantity import NAME, Section, quantity
 from sandmould.scenario.sand import ARGUED
-from sandmould.statistics.calibration.config import Calibration
-from sandmould.statistics.config import Equivalence, Objective
+from sandmould.statistics.config import Calibration, Equivalence, Objective
 
 if TYPE_CHECKING:
     from sandmould.statistics.answer import SweepEnd

@@ -22,10 +22,7 @@ def forget(names: Sequence[str], results: Path) -> list[Path]:
 
     ``names``: those of runs, ``RUN``, ``STUDY/RUN`` or the path of a run's folder.
 
-    Returns
-    -------
-    list of Path
-        Files of their studies, whose next start computes them.
+    Gives the files of their studies, whose next start computes them.
 
     Raises
     ------

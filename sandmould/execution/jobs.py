@@ -16,13 +16,20 @@ from types import FrameType
 from typing import Any, TextIO
 
 from sandmould.definition.run import LAST_MEASURED, Run
-from sandmould.execution.loading import keep_loaded, loaded
 from sandmould.execution.locks import computing
 from sandmould.execution.pool import SERVER_LOST, do, start_server
-from sandmould.execution.simulate import RESTARTABLE_EXIT, measure, render, simulate, write_crash
+from sandmould.execution.simulate import (
+    RESTARTABLE_EXIT,
+    measure_run,
+    render_run,
+    simulate,
+    write_crash,
+)
+from sandmould.kinds.registry import kind_of
 from sandmould.runs.formatting import listed
 from sandmould.runs.manifest import OUTCOME_FILE
 from sandmould.runs.parent import end_with_parent
+from sandmould.runs.provenance import commit, processor, versions
 from sandmould.study.plan.batches import is_done
 from sandmould.study.plan.lacking import Need, lack_of
 from sandmould.study.plan.plan_files import read_run
@@ -30,6 +37,7 @@ from sandmould.study.plan.plan_files import read_run
 ASKED_EXIT = 143
 """Exit status of a run that stopped early since its job is to end, as a shell gives SIGTERM."""
 _ASKED = (ASKED_EXIT, -signal.SIGTERM)
+_COMPILING = "sandmould.compiled"
 _LONGEST = 200
 """Of the words of an engine."""
 _KILLED = (SERVER_LOST, -signal.SIGKILL, -signal.SIGINT, -signal.SIGHUP, 128 + signal.SIGKILL)
@@ -66,12 +74,8 @@ def _named(work: str, *given: Any) -> None:
 def compute_run(folder: Path, log: str, ranks: int, mpi: str) -> None:
     """Compute a run whose deck is there; an outcome is written whatever happens.
 
-    Parameters
-    ----------
-    ranks : int
-        MPI ranks; 1 for an engine whose ranks are threads of one process.
-    mpi : str
-        Command that starts ranks, such as ``srun --mpi=pmi2``.
+    ``ranks``: of MPI; 1 for an engine whose ranks are threads of one process. ``mpi``: command that
+    starts them, such as ``srun --mpi=pmi2``.
 
     Raises
     ------
@@ -148,13 +152,13 @@ def _do_all(folder: Path, ranks: int, mpi: str) -> int:
     if lack_of(run, folder).need is Need.COMPUTE:
         for old in (OUTCOME_FILE, LAST_MEASURED):
             (folder / old).unlink(missing_ok=True)  # damaged, or of another scenario or deck
-        render(run, folder)
+        render_run(folder, run)
         if status := _simulate(folder, ranks, mpi, run):
             return status
     else:
         print(f"{folder.name}: computed already", file=sys.stderr)
     if lack_of(run, folder).need is not Need.NOTHING:
-        measure(run, folder)
+        measure_run(folder, run)
     return 0
 
 
@@ -166,7 +170,7 @@ def _simulate(folder: Path, ranks: int, mpi: str, run: Run | None = None) -> int
         if ranks > 1:
             status = _in_ranks(folder, ranks, mpi, lock)
         else:
-            run, before = run or read_run(folder / "scenario.yaml"), loaded()
+            run, before = run or read_run(folder / "scenario.yaml"), _loaded()
             try:
                 status = simulate(folder, run)
             except OSError as error:
@@ -176,7 +180,7 @@ def _simulate(folder: Path, ranks: int, mpi: str, run: Run | None = None) -> int
                     raise
                 print(f"{run.run}: the disk refused. {error}", file=sys.stderr)
                 return RESTARTABLE_EXIT
-            keep_loaded(run.scenario, before)
+            _keep_loaded(run.scenario, before)
         return ASKED_EXIT if status == RESTARTABLE_EXIT and is_asked() else status
 
 
@@ -218,3 +222,40 @@ def _in_ranks(folder: Path, ranks: int, mpi: str, lock: TextIO) -> int:
     signal.signal(signal.SIGTERM, stop)
     status = process.wait()
     return status if status >= 0 else 128 - status
+
+
+def load_for(scenario: Any) -> None:
+    """Load what computes and measures runs like one, and the compiled code that they called."""
+    kind = kind_of(scenario)
+    kind.execution.load_computing(scenario)
+    kind.execution.load_measuring(scenario)
+    with contextlib.suppress(Exception):  # a damaged list; what is not loaded is compiled later
+        if _COMPILING in sys.modules:
+            from sandmould.called_kernels import kept_kernels, load_kernels
+
+            load_kernels(kept_kernels(_class_of(scenario)) - _loaded())
+    kind.planning.template_hash(scenario)
+    for asked_once in (commit, versions, processor):
+        asked_once()
+
+
+def _loaded() -> set[str]:
+    """Compiled code that this process has called; what compiles is not imported to ask."""
+    if _COMPILING not in sys.modules:
+        return set()
+    from sandmould.called_kernels import loaded_kernels
+
+    return loaded_kernels()
+
+
+def _keep_loaded(scenario: Any, before: set[str]) -> None:
+    """Note for later servers what a run has called that was not loaded before."""
+    if new := _loaded() - before:
+        from sandmould.called_kernels import keep_kernels
+
+        keep_kernels(_class_of(scenario), new)
+
+
+def _class_of(scenario: Any) -> str:
+    engine, dimension = kind_of(scenario).planning.speed_class(scenario)
+    return f"{engine}_{dimension}"

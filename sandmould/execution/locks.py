@@ -14,7 +14,7 @@ from typing import TextIO
 
 from sandmould.runs.claim import Claim, owner_of
 from sandmould.runs.manifest import OUTCOME_FILE
-from sandmould.runs.words import say
+from sandmould.runs.parent import say
 
 
 @contextlib.contextmanager

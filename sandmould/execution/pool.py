@@ -19,10 +19,9 @@ from multiprocessing.connection import Connection
 from pathlib import Path
 from typing import Any, NamedTuple
 
-from sandmould.execution.spent import note_spent
 from sandmould.module_main import in_a_sentence
 from sandmould.runs.parent import call_process, end_with_parent, print_to
-from sandmould.runs.products import cpu_time_s
+from sandmould.runs.products import cpu_time_s, note_spent
 
 LOADED_FIRST = "SANDMOULD_LOADED_FIRST"
 """Variable of the environment: scenarios of runs whose libraries the server loads."""
@@ -65,14 +64,9 @@ def start_server(folders: Iterable[Path] = ()) -> None:
 def do(work: Callable[..., int | None], *given: Any, log: Path, name: str = "") -> End:
     """Do a piece of work in a process of its own and wait for its end.
 
-    Parameters
-    ----------
-    work : callable
-        A function of a module; gives the exit status, None for 0.
-    log : Path
-        Takes all that it prints, which also goes to standard error.
-    name : str
-        Of the run, which its lines in the log begin with, since several may share it.
+    ``work``: a function of a module; gives the exit status, None for 0. ``log`` takes all that it
+    prints, which also goes to standard error. ``name``: of the run, which its lines in the log
+    begin with, since several may share it.
     """
     start_server()
     reader, writer = _CONTEXT.Pipe(duplex=False)

@@ -15,11 +15,10 @@ signal.signal(signal.SIGTERM, signal.SIG_IGN)
 call_process("sandmould-ready")
 if scenarios := os.environ.get(LOADED_FIRST):
     from sandmould.execution import jobs  # with all that jobs import
-    from sandmould.execution.loading import load_for
 
     for path in scenarios.split(os.pathsep):
         try:
-            load_for(jobs.read_run(Path(path)).scenario)
+            jobs.load_for(jobs.read_run(Path(path)).scenario)
         except Exception:  # the run meets the same; the server must live for the others
             traceback.print_exc()
     gc.freeze()  # a child that looks through what is here would copy it

@@ -162,11 +162,8 @@ def over_time(curves: pd.DataFrame, measure: str) -> pd.DataFrame:
 
     ``curves``: one row a snapshot.
 
-    Returns
-    -------
-    DataFrame
-        ``RUN``, ``VIBRATION_TIME_S`` and the measure at the snapshots next to those moments; no row
-        where nothing vibrates.
+    Gives ``RUN``, ``VIBRATION_TIME_S`` and the measure at the snapshots next to those moments; no
+    row where nothing vibrates.
     """
     kept = []
     if VIBRATION_TIME_S in curves and measure in curves:
@@ -232,10 +229,7 @@ def recompute_smallest(results: Path) -> list[str]:
 
     Records of old defaults and studies with an engine that this machine lacks are passed over.
 
-    Returns
-    -------
-    list of str
-        One sentence a difference beyond its margin.
+    Gives one sentence a difference beyond its margin.
     """
     old = {name for name, why in stale_records() if why == OLD_DEFAULTS}
     kept = [path for path in RECORDS.glob("*/record.json") if path.parent.name not in old]
@@ -284,10 +278,7 @@ def renew(results: Path) -> int:
     What was computed before stays: called again, it goes on. A study that needs an engine which
     this machine lacks, or longer than ``MOST_S``, is named and left.
 
-    Returns
-    -------
-    int
-        Studies without a new record.
+    Gives the number of studies without a new record.
     """
     waiting: list[tuple[float, str, str]] = []
     for name, why in stale_records():

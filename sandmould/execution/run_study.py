@@ -3,51 +3,58 @@
 Snakemake computes the runs; where the study asks for rounds, its results choose the runs of the
 next one, which are appended until there is reason to end, then those of its controls. Options
 go on to Snakemake.
+
+To start Snakemake takes longer than all else of a command that has nothing to compute. So what it
+looks at is noted when it has ended well, and it is asked again once any of that has changed.
 """
 
 from __future__ import annotations
 
+import contextlib
 import os
 import re
 import sys
 import time
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from functools import partial
 from pathlib import Path
 
 import sandmould.runs.one_blas_thread  # noqa: F401
 from sandmould import SHIPPED
 from sandmould.bad_input import BAD_INPUT_EXIT
+from sandmould.definition.run import LAST_MEASURED
+from sandmould.digest import digest
 from sandmould.execution.cluster.driver import replace_driver
 from sandmould.execution.cluster.queue import end_jobs, jobs_of
 from sandmould.execution.cluster.settings import goes_to_slurm, may_be_elsewhere
 from sandmould.execution.locks import let_go
 from sandmould.execution.screen.ending import last_line, trouble
 from sandmould.execution.screen.screen import Screen
-from sandmould.execution.settled import is_settled, note_settled
-from sandmould.execution.spent import note_spent
 from sandmould.execution.stopping import Stopped, run_in_group, until_stopped
+from sandmould.plain_file import UNREADABLE, read_plain
+from sandmould.runs.claim import CLAIM_FILE
+from sandmould.runs.files import write_text
+from sandmould.runs.manifest import MANIFEST_FILE, OUTCOME_FILE
+from sandmould.runs.products import SPENT_FILE, note_spent
+from sandmould.study.plan.announcement import write_files
 from sandmould.study.plan.build_plan import RESULTS, Plan, checked_plan, starts_jobs, writing
 from sandmould.study.plan.grain_check import coarser_text
 from sandmould.study.plan.plan_files import SUMMARY
 from sandmould.study.robustness.controls import COARSER
 
+_SETTLED_FILE = "settled.txt"
+_NOT_LOOKED_AT = ("logs", "lock", CLAIM_FILE, SPENT_FILE, _SETTLED_FILE)
+_OF_RUN = ("deck.in", OUTCOME_FILE, MANIFEST_FILE, "series.tsv", LAST_MEASURED)
+
 
 def run_study(path: Path, options: Sequence[str], opening: str = "") -> int:
     """Compute a study, all its rounds and its robustness checks.
 
-    Parameters
-    ----------
-    options : sequence of str
-        Of Snakemake, such as ``--cores 4`` or ``--workflow-profile profiles/slurm``.
-    opening : str, optional
-        What the last line begins with where all went well.
+    ``options``: of Snakemake, such as ``--cores 4`` or ``--workflow-profile profiles/slurm``;
+    ``opening``: what the last line begins with where all went well.
 
-    Returns
-    -------
-    int
-        Exit status of the last call of Snakemake: not 0 where a run failed, or that of a shell
-        after Ctrl-C or kill.
+    Gives the exit status of the last call of Snakemake: not 0 where a run failed, or that of a
+    shell after Ctrl-C or kill.
 
     Raises
     ------
@@ -157,14 +164,10 @@ def _be_snakemake(arguments: Sequence[str], folder: Path) -> None:
 def stated_cores(options: Sequence[str]) -> int | None:
     """Cores, or jobs at a time, as the options of Snakemake state them; None where none does.
 
-    Returns
-    -------
-    int or None
-        All cores of this machine for words such as ``all``.
+    All cores of this machine for words such as ``all``.
     """
     for place, option in enumerate(options):
-        found = _CORES.match(option)
-        if found:
+        if found := _CORES.match(option):
             value = found["value"] or next(iter(options[place + 1 :]), "")
             return int(value) if value.isdecimal() else _all_cores()
     return None
@@ -175,3 +178,44 @@ _CORES = re.compile(r"(?:--cores|--jobs|-c|-j)(?:=?(?P<value>\w+))?$")
 
 def _all_cores() -> int:
     return os.cpu_count() or 1
+
+
+def is_settled(plan: Plan, results: Path) -> bool:
+    """Whether no run lacks anything, and all files are those of the last start that ended well.
+
+    The plan is written to disk where that may be so.
+    """
+    try:
+        noted = read_plain(results / plan.study.name / _SETTLED_FILE)
+    except UNREADABLE:
+        return False
+    if plan.lacks(results):
+        return False
+    write_files(plan, results)
+    return noted == _state(plan, results)
+
+
+def note_settled(plan: Plan, results: Path) -> None:
+    """Note that nothing is left to do."""
+    with contextlib.suppress(OSError):  # without it Snakemake is asked once more
+        write_text(results / plan.study.name / _SETTLED_FILE, _state(plan, results))
+
+
+def _state(plan: Plan, results: Path) -> str:
+    """Hash of names, sizes and times of all that Snakemake looks at."""
+    states = []
+    for path in _looked_at(plan, results):
+        if path.exists():
+            stat = path.stat()
+            states.append(f"{path} {stat.st_size} {stat.st_mtime_ns}\n")
+    return digest(*states)
+
+
+def _looked_at(plan: Plan, results: Path) -> Iterator[Path]:
+    folder = results / plan.study.name
+    yield from (path for path in sorted(folder.iterdir()) if path.name not in _NOT_LOOKED_AT)
+    yield from sorted((folder / "batches").glob("*"))
+    yield from (folder / run.place / name for run in plan.runs for name in _OF_RUN)
+    yield from (results / name / SUMMARY for name in plan.study.study.calibration.also)
+    for rules in ("Snakefile", "workflow/rules/*", "templates/report/*"):
+        yield from sorted(SHIPPED.glob(rules))

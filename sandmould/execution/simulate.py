@@ -23,14 +23,10 @@ RESTARTABLE_EXIT = 75
 """Exit status of a run that the same command continues (EX_TEMPFAIL of sysexits.h)."""
 
 
-def render_run(folder: Path) -> None:
-    """Render the deck of a run into its folder."""
-    render(read_run(folder / "scenario.yaml"), folder)
-
-
-def measure_run(folder: Path) -> None:
-    """Measure what a run left behind."""
-    measure(read_run(folder / "scenario.yaml"), folder)
+def render_run(folder: Path, run: Run | None = None) -> None:
+    """Render the deck of a run into its folder; ``run``: read from there unless given."""
+    run = run or read_run(folder / "scenario.yaml")
+    kind_of(run.scenario).execution.render(run, folder)
 
 
 def export_run(folder: Path) -> None:
@@ -39,13 +35,9 @@ def export_run(folder: Path) -> None:
     kind_of(run.scenario).execution.export(run, folder)
 
 
-def render(run: Run, folder: Path) -> None:
-    """The same of a run that is read already."""
-    kind_of(run.scenario).execution.render(run, folder)
-
-
-def measure(run: Run, folder: Path) -> None:
-    """The same of a run that is read already; what it writes is written down."""
+def measure_run(folder: Path, run: Run | None = None) -> None:
+    """Measure what a run left behind, and write down what that writes."""
+    run = run or read_run(folder / "scenario.yaml")
     for old in EXPORTED:  # of other grains, or drawn by other code
         (folder / old).unlink(missing_ok=True)
     earlier = {path: path.stat().st_mtime_ns for path in folder.rglob("*") if path.is_file()}
@@ -71,11 +63,8 @@ def simulate(folder: Path, run: Run | None = None) -> int:
 
     ``run``: read from its folder unless given.
 
-    Returns
-    -------
-    int
-        Exit status: 0 when the outcome is written, ``RESTARTABLE_EXIT`` when the run stopped
-        early with a checkpoint.
+    Gives the exit status: 0 when the outcome is written, ``RESTARTABLE_EXIT`` when the run stopped
+    early with a checkpoint.
     """
     run = run or read_run(folder / "scenario.yaml")
     computed = kind_of(run.scenario).execution.compute(run, folder)

@@ -15,20 +15,20 @@ from sandmould.definition.run import Run
 from sandmould.execution.cluster.driver import driver_lines
 from sandmould.execution.cluster.queue import Job, Outlook, jobs_of, live_jobs, outlook, queue_lines
 from sandmould.execution.locks import is_locked
-from sandmould.execution.spent import noted_s
 from sandmould.execution.tidy import freed_bytes, orphans
-from sandmould.execution.time_left import TimeLeft
 from sandmould.plain_file import UNREADABLE, read_json
 from sandmould.runs.claim import owner_of
 from sandmould.runs.formatting import size_text
 from sandmould.runs.hashing import scenario_hash
 from sandmould.runs.manifest import change, read_manifest
 from sandmould.runs.outcome import Outcome, RunOutcome
+from sandmould.runs.products import noted_s
 from sandmould.runs.progress import duration_text
 from sandmould.study.plan.announcement import stored_speeds
 from sandmould.study.plan.build_plan import Plan
 from sandmould.study.plan.lacking import WHOLE, Lack, Need
 from sandmould.study.plan.plan_files import SUMMARY, changed_line, read_run
+from sandmould.study.plan.price import TimeLeft
 from sandmould.study.rounds.round_log import read_rounds
 
 State = Literal["done", "failed", "running", "stopped", "waiting"]
@@ -52,16 +52,9 @@ class RunStatus:
 
 
 def run_status(folder: Path, lack: Lack, live: Collection[str] | None = None) -> RunStatus:
-    """See where a run stands from what it has written.
+    """See where a run stands from what it has written, and what a start would do for it.
 
-    Parameters
-    ----------
-    folder : Path
-        ``results/<study>/runs/<run>``.
-    lack : Lack
-        What a start would do for it.
-    live : collection of str, optional
-        Numbers of the jobs of the cluster that have not ended, where that is known.
+    ``live``: numbers of the jobs of the cluster that have not ended, where that is known.
     """
     name = folder.name
     if lack.need is Need.NOTHING:

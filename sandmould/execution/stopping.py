@@ -37,12 +37,7 @@ class Stopped(BaseException):
 def until_stopped(work: Callable[[], int], name: str) -> int:
     """Do a command's work; at Ctrl-C or kill say that the same command goes on.
 
-    ``work``: gives the exit status.
-
-    Returns
-    -------
-    int
-        The exit status of the work, or that of a shell after the signal.
+    Gives the exit status of the work, or that of a shell after the signal.
     """
     try:
         with _stopping():
@@ -86,16 +81,10 @@ def run_in_group(
     A signal of the terminal would reach every job by itself, and each would say so. Jobs on this
     machine are killed: a run goes on from its last checkpoint, bit for bit.
 
-    Parameters
-    ----------
-    work : callable
-        What the process does that is forked from this one; ends by ``SystemExit``.
-    log : file, optional
-        Takes all that it and its jobs print; the terminal unless given.
-    look : callable, optional
-        Called while it runs; gives the seconds until the next call.
-    asked_first : bool
-        Whether it is first asked to end, as Snakemake must be to cancel jobs elsewhere.
+    ``work``: what the process does that is forked from this one; ends by ``SystemExit``. ``log``
+    takes all that it and its jobs print; the terminal unless given. ``look``: called while it runs;
+    gives the seconds until the next call. ``asked_first``: whether it is first asked to end, as
+    Snakemake must be to cancel jobs elsewhere.
 
     Raises
     ------

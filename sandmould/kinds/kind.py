@@ -2,11 +2,16 @@
 
 from __future__ import annotations
 
+import contextlib
+import math
+import os
+import platform
 from abc import ABC, abstractmethod
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property
 from importlib import import_module
+from importlib.metadata import version
 from pathlib import Path
 from typing import Any, Generic, TypeVar
 
@@ -14,14 +19,15 @@ from sandmould import ROOT
 from sandmould.bad_input import Problem
 from sandmould.definition.run import Run
 from sandmould.definition.study import Study
-from sandmould.digest import code_identity
-from sandmould.kinds.stored_speed import StoredSpeed
+from sandmould.digest import SHORT, code_identity, digest
 from sandmould.runs.files import write_text
 from sandmould.runs.hashing import solution_hash
 from sandmould.runs.measures import MeasureGroup
 from sandmould.runs.products import Computed, Cost
+from sandmould.runs.provenance import processor
 from sandmould.runs.templates import Note
 from sandmould.scenario.quantity import Section
+from sandmould.user_cache import user_cache
 
 AnyScenario = Section
 """A scenario of any kind."""
@@ -52,6 +58,61 @@ class UserProgram(ABC, Generic[ScenarioT]):
     @abstractmethod
     def to_read(self, scenarios: Sequence[ScenarioT]) -> list[str]:
         """Lines of it that a person should read before running it."""
+
+
+class StoredSpeed(ABC, Generic[ScenarioT]):
+    """How fast a core of this machine is: measured once for all scenarios that run at one speed.
+
+    A kind says what they have in common, and how the speed is measured.
+    """
+
+    basis = "at the speed measured on this machine"
+    """What a price rests on that was reckoned with it."""
+
+    @abstractmethod
+    def computed_by(self, scenario: ScenarioT) -> str:
+        """Name what is the same for all that run at one speed: engine, version, dimension."""
+
+    @abstractmethod
+    def trial(self, scenario: ScenarioT, results: Path) -> float | None:
+        """Measure what is stored: work a second of one core; None where that failed."""
+
+    def rate(self, scenario: ScenarioT, stored: float) -> float:
+        """Work a second of one core by what is stored."""
+        return stored
+
+    def stored(self, scenario: ScenarioT) -> float | None:
+        """Work a second of one core as measured before; None where it was not. Starts nothing."""
+        try:
+            found = float(self.file(scenario).read_text(encoding="utf-8"))
+        except (OSError, ValueError):  # it was not measured, or the file is damaged
+            return None
+        return self.rate(scenario, found) if 0.0 < found < math.inf else None
+
+    def measured(self, scenario: ScenarioT, results: Path) -> float | None:
+        """The same, measured now and stored where it was not before; None where it cannot be.
+
+        Raises
+        ------
+        BadInputError
+            Where a program of the user's stops with an error.
+        """
+        rate = self.stored(scenario)
+        if rate is None and (found := self.trial(scenario, results)) is not None:
+            file = self.file(scenario)
+            partial = file.with_suffix(f".{os.getpid()}")  # another start may write its own
+            with contextlib.suppress(OSError):  # it is measured anew where nothing can be kept
+                file.parent.mkdir(parents=True, exist_ok=True)
+                partial.write_text(str(found), encoding="utf-8")
+                partial.replace(file)
+            rate = self.rate(scenario, found)
+        return rate
+
+    def file(self, scenario: ScenarioT) -> Path:
+        """Where the speed of a scenario is kept, by all that it depends on."""
+        machine = f"{platform.node()} {processor()} numba {version('numba')}"
+        key = digest(f"{machine} {self.computed_by(scenario)}")[:SHORT]
+        return user_cache() / "speeds" / f"{key}.txt"
 
 
 class Planning(ABC, Generic[ScenarioT]):

@@ -99,13 +99,14 @@ def begin_again(work: Path, bed_limit_s: float, cost: dict[str, Any]) -> None:
     lay(work / _FILLED, work / "checkpoint_a", mark)
 
 
-def read_mark(folder: Path) -> CheckpointMark:
+def read_mark(folder: Path, scenario_hash: str = "") -> CheckpointMark:
     """Read the mark of a checkpoint whose files are all as they were sealed.
 
     Raises
     ------
     ValueError
-        When the checkpoint is missing or damaged, or of a version with other files.
+        When the checkpoint is missing or damaged, of a version with other files, or not of the
+        scenario of a hash that is given.
     """
     try:
         sealed = read_json(folder / "mark.json")
@@ -114,6 +115,8 @@ def read_mark(folder: Path) -> CheckpointMark:
         mark = CheckpointMark(**sealed["mark"])
         if mark.layout != LAYOUT:
             raise ValueError("another version of Sandmould wrote it")
+        if scenario_hash not in ("", mark.scenario_hash):
+            raise ValueError("it is of another scenario")
         return mark
     except (OSError, KeyError, TypeError) as error:
         raise ValueError(str(error)) from error

@@ -71,21 +71,18 @@ _NAMES = {
     "apparent_density_corrected_kg_m3": "apparent density, corrected for walls",
 }
 
-_OF_PROBE = {
-    "_window_sd_pa": "deviation of short means of the pressure",
-    "_sd_pa": "deviation of the pressure",
-    "_mean_pa": "mean pressure",
-    "_error_pa": "error of the mean pressure",
-}
-"""Measures at a probe of a flow."""
-_OF_CAVITY = {
+_OF_THING = {
+    "_window_sd_pa": "deviation of short means of the pressure at",
+    "_sd_pa": "deviation of the pressure at",
+    "_mean_pa": "mean pressure at",
+    "_error_pa": "error of the mean pressure at",
     "_filled_depth_m": "filled depth of the",
     "_void_fraction": "share of voids in the",
     "_largest_void_m2": "largest void in the",
     "_largest_void_m3": "largest void in the",
     "_voids": "number of voids in the",
 }
-"""Measures of a cavity."""
+"""Measures at a probe of a flow, and of a cavity."""
 _SHOWN = {"m": (1e3, "mm"), "m²": (1e6, "mm²"), "m³": (1e6, "cm³")}
 _PREFIXES = ((1e9, 1e9, "G"), (1e6, 1e6, "M"), (1e4, 1e3, "k"))
 """From which value on, the factor and its letter."""
@@ -138,10 +135,7 @@ def name_of(key: str) -> str:
     if (space := filled_space(last)) != last:
         share = " as a share of what fits" if last.endswith(OF_BED) else ""
         return f"fill of the {space.replace('_', ' ')}{share}"
-    for ending, what in _OF_PROBE.items():
-        if last.endswith(ending):
-            return f"{what} at {last.removesuffix(ending).replace('_', ' ')}"
-    for ending, what in _OF_CAVITY.items():
+    for ending, what in _OF_THING.items():
         if last.endswith(ending):
             return f"{what} {last.removesuffix(ending).replace('_', ' ')}"
     suffix = next((s for s, _ in _UNITS if last.endswith(s)), "")

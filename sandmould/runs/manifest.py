@@ -63,16 +63,8 @@ def write_manifest(
 
     ``computed`` begins anew, with the hash of the deck that was computed; ``measured`` adds to it.
 
-    Parameters
-    ----------
-    origin : mapping, optional
-        Provenance of what was computed.
-    cost : mapping, optional
-        Its cost row.
-    code : str, optional
-        State of the code that measured.
-    outcome : str, optional
-        What the outcome's file will hold.
+    ``origin``, ``cost``: provenance and cost row of what was computed; ``code``: state of the code
+    that measured; ``outcome``: what the outcome's file will hold.
     """
     if step == "computed":
         deck = folder / DECK_FILE

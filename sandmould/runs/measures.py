@@ -58,12 +58,8 @@ def read_groups(
 ) -> tuple[MeasureGroup[SceneT], ...]:
     """Groups of measures as a file of a kind of study describes them.
 
-    Parameters
-    ----------
-    path : Path
-        Names and meanings by group; ``[words, meaning]`` of a measure that is no number.
-    things : mapping of str to callable
-        What each group measures in a scene.
+    It has names and meanings by group, ``[words, meaning]`` of a measure that is no number;
+    ``things``: what each group measures in a scene.
     """
     return tuple(
         MeasureGroup(when, things[when], tuple(_described(*each) for each in measures.items()))

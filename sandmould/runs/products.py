@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import contextlib
 import os
 import resource
 import shutil
@@ -78,12 +79,28 @@ def cpu_time_s() -> float:
     return sum(os.times()[:4])
 
 
+def note_spent(study_folder: Path, spent_s: float) -> None:
+    """Write down what a process has spent, with children that do not do so themselves."""
+    with contextlib.suppress(OSError), (study_folder / SPENT_FILE).open("a") as file:
+        file.write(f"{spent_s:.2f}\n")
+
+
+def noted_s(study_folder: Path) -> float:
+    """What all that ended have spent."""
+    with contextlib.suppress(OSError, ValueError):
+        lines = (study_folder / SPENT_FILE).read_text(encoding="ascii").splitlines()
+        return sum(float(line) for line in lines)
+    return 0.0
+
+
 def peak_memory_bytes() -> int:
     """Largest resident memory of this process and of the largest engine it has seen end."""
     whose = (resource.RUSAGE_SELF, resource.RUSAGE_CHILDREN)
     return sum(resource.getrusage(who).ru_maxrss for who in whose) * 1024
 
 
+SPENT_FILE = "spent_s.txt"
+"""In ``results/<study>``: processor time of each of its processes that ended, a line each."""
 LAST_WORK = "last_work"
 """Folder of what a failed run leaves besides its products, its last checkpoint above all."""
 TABLE_PERIODS = "table.tsv"

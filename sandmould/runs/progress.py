@@ -32,12 +32,8 @@ class Progress:
     ) -> None:
         """Begin.
 
-        Parameters
-        ----------
-        work : Path
-            Takes ``progress.json``.
-        expected : float or None
-            Work of the whole run in its unit; None where nobody knows.
+        ``work`` takes ``progress.json``; ``expected``: work of the whole run in its unit, None
+        where nobody knows.
         """
         self._name = name
         self._path = work / "progress.json"

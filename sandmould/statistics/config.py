@@ -1,18 +1,21 @@
-"""What a study compares its runs by: its objective, and its margins of equivalence."""
+"""What a study compares its runs by: objective, margins, cases of controls, values measured."""
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import Annotated, Literal
 
 from pydantic import Field, model_validator
 from pydantic_core import PydanticCustomError
 
+from sandmould.runs.columns import CONTROL
 from sandmould.runs.formatting import FILL, OF_BED, filled_space
 from sandmould.scenario.quantity import NAME, Section, quantity
 from sandmould.scenario.sand import ARGUED
 
 Better = Literal["larger", "smaller", "neither"]
+SPRINGS = "springs"
+"""Control whose cases are whole curves, each over frequency in one hold."""
 FULL = "full"
 FULL_SHARE = 0.95
 """Of what fits into a tube or cavity, as densely as the bed: from there on it is full."""
@@ -24,6 +27,30 @@ class Goal:
 
     measure: str
     value: float
+
+
+@dataclass(frozen=True)
+class ControlCase:
+    """One case of a control: what is changed, and to what."""
+
+    control: str
+    value: str
+    """In words."""
+    factor: float | None
+    """What the property is multiplied by; None where a control does not multiply."""
+    hold: str = field(default="", kw_only=True)
+    """Amplitude that is held in a curve of the control springs; empty of all others."""
+
+    @property
+    def part(self) -> str:
+        """What it is called in ``runs.tsv``."""
+        return f"{CONTROL}{self.control} {self.value}"
+
+    @property
+    def name(self) -> str:
+        """As sentences name it."""
+        what = self.control.replace("_", " ")
+        return f"{self.value} held" if self.control == "hold" else f"{what} {self.value}"
 
 
 class Reported(Section):
@@ -127,3 +154,41 @@ class Equivalence(Section):
 def fewest_points(keys: int) -> int:
     """Different points that a surface over some keys needs."""
     return 2 + 2 * keys
+
+
+class Target(Section):
+    """A value measured on the real sand, or assumed of it."""
+
+    value: float = quantity(..., "The value.", unit="of the column or key", source="user")
+    sd: float = quantity(
+        ..., "Its standard deviation, of the mean of what was measured.",
+        unit="of the column or key", source="user", gt=0,
+    )  # fmt: skip
+
+
+class TargetSand(Section):
+    """One real sand: what was measured on it, and the material that is made of that."""
+
+    name: str = quantity(..., "Name of the material that is written.", source="user", pattern=NAME)
+    targets: dict[Annotated[str, Field(pattern=NAME)], Target] = Field(
+        ..., min_length=1, description="Columns of summary.tsv and what was measured of each."
+    )
+    assumed: dict[str, Target] = Field(
+        {},
+        description="Swept keys, each with what is taken for granted of it, such as a rolling "
+        "angle of 10 degrees. One measured value leaves a ridge of points that fit; this picks a "
+        "place on it.",
+    )
+
+
+class Calibration(Section):
+    """Sands whose two swept keys are found from what was measured on them."""
+
+    sands: tuple[TargetSand, ...] = Field(
+        (), description="The sands; none asks for no calibration."
+    )
+    also: tuple[Annotated[str, Field(pattern=NAME)], ...] = Field(
+        (),
+        description="Finished studies that sweep the same two keys over another scene. Their "
+        "columns get the study's name and two underscores in front.",
+    )

@@ -139,10 +139,7 @@ class Spread:
         degrees of freedom count alone (Games and Howell 1976): a wild setting would else hide what
         calm ones differ by. Elsewhere the two count where they scatter more than all settings do.
 
-        Returns
-        -------
-        (float, MeanTest or None)
-            The first minus the second; None where no spread is left to test by.
+        Gives the first minus the second, and the test; None where no spread is left to test by.
         """
         contrasts = self.contrasts
         difference, scale = contrasts.difference(self._place(first), self._place(second))

@@ -15,6 +15,8 @@ from sandmould.runs.templates import worded
 from sandmould.statistics.config import fewest_points
 
 Array = NDArray[np.float64]
+_THREADS = 1
+"""For matrices of ten rows: to wait for the other cores takes ten times as long."""
 
 
 class TooFewRunsError(ValueError):
@@ -45,7 +47,7 @@ class Emulator:
         -------
         mean, se : (n,) float64, in the unit of the measure
         """
-        with _one_thread():
+        with threadpool_limits(_THREADS):
             mean, se = self._process.predict(_scaled(points, self.low, self.high), return_std=True)
         return self._middle + self._spread * mean, self._spread * se
 
@@ -58,7 +60,7 @@ class Emulator:
         -------
         (number, n) float64, in the unit of the measure
         """
-        with _one_thread():
+        with threadpool_limits(_THREADS):
             mean, covariance = self._process.predict(
                 _scaled(points, self.low, self.high), return_cov=True
             )
@@ -68,11 +70,6 @@ class Emulator:
         normal = np.random.default_rng(seed).normal(size=(number, len(points)))
         drawn: Array = self._middle + self._spread * (mean + normal @ root.T)
         return drawn
-
-
-def _one_thread() -> threadpool_limits:
-    """Keep matrices of ten rows off the other cores: waiting for them takes ten times as long."""
-    return threadpool_limits(1)
 
 
 def fit_emulator(measure: str, points: Array, values: Array) -> Emulator:
@@ -117,7 +114,7 @@ def fit_emulator(measure: str, points: Array, values: Array) -> Emulator:
     else:
         kernel += WhiteKernel(1e-2, (1e-8, 1.0))
     process = GaussianProcessRegressor(kernel, alpha=alpha, n_restarts_optimizer=4, random_state=1)
-    with warnings.catch_warnings(), _one_thread():
+    with warnings.catch_warnings(), threadpool_limits(_THREADS):
         # A length at its bound says that the measure hardly depends on a key.
         warnings.simplefilter("ignore", ConvergenceWarning)
         process.fit(_scaled(distinct, low, high), (means - middle) / spread)

@@ -44,10 +44,7 @@ def loop_fails(summary: pd.DataFrame, measure: str) -> pd.Series[bool]:
 def left_out(summary: pd.DataFrame, measure: str) -> pd.Series[str]:
     """Why each run is no evidence of a measure; empty where it is.
 
-    Returns
-    -------
-    Series of str
-        ``NOT_FINISHED``, a state in ``UNTRUSTED``, ``NO_VALUE`` or an empty text, by row.
+    Gives ``NOT_FINISHED``, a state in ``UNTRUSTED``, ``NO_VALUE`` or an empty text, by row.
     """
     why = pd.Series("", index=summary.index, dtype=object)
     why[_numbers(summary, measure).isna()] = NO_VALUE

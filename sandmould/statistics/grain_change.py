@@ -90,14 +90,7 @@ def grain_changes(
 ) -> Iterator[GrainChange]:
     """Compare runs with coarser grains to those of the sweep at the same setting.
 
-    Parameters
-    ----------
-    summary : DataFrame
-        One row a run, those with coarser grains among them.
-    keys : sequence of str
-        Swept keys.
-    part : str
-        What the runs with coarser grains are called in the summary.
+    ``part``: what the runs with coarser grains are called in the summary.
     """
     if PART not in summary or not (summary[PART] == part).any():
         return
@@ -111,13 +104,7 @@ def grain_changes(
 
 
 def order_of(best: GrainChange, rival: GrainChange, better: str) -> Literal["same", "other", ""]:
-    """Whether the best setting stays ahead of another one with coarser grains; empty if not told.
-
-    Parameters
-    ----------
-    best, rival : GrainChange
-        Of one measure.
-    """
+    """Whether the best setting stays ahead with coarser grains; empty if that is not told."""
     ahead = GrainChange({}, best.measure, rival.coarser, best.coarser)
     if not ahead.is_seen:
         return ""

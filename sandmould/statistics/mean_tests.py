@@ -84,11 +84,8 @@ def compare_means(
 ) -> tuple[MeanTest, bool] | None:
     """Test the difference of two means: in pairs where both have the same blocks, else by Welch.
 
-    Returns
-    -------
-    (MeanTest, bool) or None
-        The test, and whether it is paired. None where a side has fewer than two values, or where
-        no spread is left to test by.
+    Gives the test, and whether it is paired. None where a side has fewer than two values, or where
+    no spread is left to test by.
     """
     if len(first) < 2 or len(second) < 2:
         return None

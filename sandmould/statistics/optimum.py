@@ -1,16 +1,18 @@
-"""Where the best setting lies between the runs, how sure that is, and how flat it is there."""
+"""Where the best setting lies between the runs, how sure that is, and which runs would tell it."""
 
 from __future__ import annotations
 
 import itertools
-from collections.abc import Sequence
+import math
+from collections.abc import Collection, Sequence
 from dataclasses import dataclass
-from functools import cached_property
+from functools import cached_property, partial
 
 import numpy as np
 import pandas as pd
 from numpy.typing import NDArray
 
+from sandmould.runs.columns import REPLICATE
 from sandmould.statistics.answer import SweepEnd
 from sandmould.statistics.config import Better
 from sandmould.statistics.emulator import Array, Emulator, fit_emulator
@@ -20,6 +22,9 @@ from sandmould.statistics.mean_tests import CONFIDENCE
 DRAWS = 2000
 VAGUE = 0.5
 """Share of the sweep beyond which an interval names no best value (argued)."""
+NEAR, DIGITS = 0.03, 3
+"""Share of the range within which a new point would tell no more than a replicate, and digits of
+a new one."""
 LOG_RATIO = 4.0
 """A key whose values span more than this ratio is looked at by its logarithm."""
 _ACROSS = {1: 241, 2: 41}
@@ -135,9 +140,9 @@ def find_optimum(
     low, high = points.min(axis=0), points.max(axis=0)
     logs = (low > 0.0) & (high > LOG_RATIO * low)
     emulator = fit_emulator(measure, _scaled(points, logs), values)
-    grid = _unscaled(_grid(_scaled(low, logs), _scaled(high, logs)), logs)
+    grid = _grid(_scaled(low, logs), _scaled(high, logs))
     # Rounding there and back must not leave the swept range.
-    grid = np.clip(grid, low, high)
+    grid = np.clip(np.where(logs, np.exp(np.where(logs, grid, 0.0)), grid), low, high)
     sign = 1 if better == "larger" else -1
     drawn = emulator.draws(_scaled(grid, logs), DRAWS, seed)
     picks = (sign * drawn).argmax(axis=1)
@@ -161,6 +166,57 @@ def _scaled(points: Array, logs: NDArray[np.bool_]) -> Array:
     return scaled
 
 
-def _unscaled(points: Array, logs: NDArray[np.bool_]) -> Array:
-    unscaled: Array = np.where(logs, np.exp(np.where(logs, points, 0.0)), points)
-    return unscaled
+def propose(
+    optimum: Optimum, summary: pd.DataFrame, runs: int, seed: int, whole: Collection[str] = ()
+) -> list[tuple[dict[str, float], int]]:
+    """Choose runs where the optimum may lie: each where one drawn surface is best.
+
+    A point near one that has runs becomes a further replicate of that: so replicates come where
+    the spread hides the best, and new points where the surface is not known.
+
+    ``whole``: keys that take whole numbers only.
+    """
+    keys = optimum.keys
+    rng = np.random.default_rng([seed, runs])
+    count: dict[tuple[float, ...], int] = {}
+    for *values_of_run, replicate in (
+        summary[[*keys, REPLICATE]].to_numpy(dtype=np.float64).tolist()
+    ):
+        place = tuple(values_of_run)
+        count[place] = max(count.get(place, 0), int(replicate))
+    chosen = []
+    for pick in rng.choice(optimum.picks, size=runs, replace=False):
+        values = _rounded(keys, optimum.points[int(pick)].tolist(), optimum, whole)
+        nearest = min(count, key=partial(_apart, optimum, second=values))
+        if _apart(optimum, nearest, values) <= NEAR:
+            values = nearest
+        count[values] = count.get(values, 0) + 1
+        chosen.append((_point(keys, values, whole), count[values]))
+    return chosen
+
+
+def _apart(optimum: Optimum, first: Sequence[float], second: Sequence[float]) -> float:
+    """Largest distance along a key, over its range; logarithms where the optimum takes them."""
+    ends = optimum.points.min(axis=0), optimum.points.max(axis=0)
+    far = 0.0
+    for a, b, low, high, log in zip(first, second, *ends, optimum.logs, strict=True):
+        share = math.log(b / a) / math.log(high / low) if log else (b - a) / (high - low)
+        far = max(far, abs(share))
+    return far
+
+
+def _rounded(
+    keys: Sequence[str], values: Sequence[float], optimum: Optimum, whole: Collection[str]
+) -> tuple[float, ...]:
+    """Values of few digits, inside what was swept."""
+    low, high = optimum.points.min(axis=0), optimum.points.max(axis=0)
+    return tuple(
+        float(np.clip(round(v) if key in whole else float(f"{v:.{DIGITS}g}"), a, b))
+        for key, v, a, b in zip(keys, values, low, high, strict=True)
+    )
+
+
+def _point(
+    keys: Sequence[str], values: Sequence[float], whole: Collection[str]
+) -> dict[str, float]:
+    return {key: round(v) if key in whole else v for key, v in zip(keys, values, strict=True)}

@@ -62,12 +62,7 @@ def recommend(
 ) -> Recommendation | None:
     """Recommend a frequency where the controls allow it; None where springs were not controlled.
 
-    Parameters
-    ----------
-    interval_hz : (float, float)
-        95 % interval of the optimum.
-    sand : SandWaveSpeed, optional
-        Of the real sand, from a source.
+    ``interval_hz``: 95 % interval of the optimum; ``sand``: of the real sand, from a source.
     """
     if robustness.springs is None:
         return None

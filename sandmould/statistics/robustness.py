@@ -11,8 +11,7 @@ import pandas as pd
 import scipy
 
 from sandmould.runs.columns import PART, RUN, SWEEP, finished
-from sandmould.statistics.config import Objective
-from sandmould.statistics.control_case import SPRINGS, ControlCase
+from sandmould.statistics.config import SPRINGS, ControlCase, Objective
 from sandmould.statistics.evidence import usable_values
 from sandmould.statistics.mean_tests import CONFIDENCE
 from sandmould.statistics.spring_dependence import FOLLOWS, SHARE, STAYS, SpringCheck
@@ -152,7 +151,8 @@ def assess_robustness(
         ends = [(p, f) for p in (part, SWEEP) for f in (certified_hz[0], certified_hz[2])]
         lower, upper, sweep_lower, sweep_upper = (mean.get(end, math.nan) for end in ends)
         shift = (upper - lower) - (sweep_upper - sweep_lower)
-        ci, verdict = (math.nan, math.nan), _without_interval(shift)
+        ci = (math.nan, math.nan)
+        verdict: ShiftVerdict = "no result" if math.isnan(shift) else "unclear"
         if math.isfinite(shift) and freedom:
             error = sd * math.sqrt(sum(1.0 / count[end] for end in ends))
             reach = float(scipy.special.stdtrit(freedom, 0.5 + CONFIDENCE / 2)) * error
@@ -163,10 +163,6 @@ def assess_robustness(
     cause, lacking = _together(shifts, springs)
     of_sweep = tuple(sign * v for v in sweep)
     return Robustness(cause, certified_hz[1], lacking, of_sweep, tuple(shifts), margin, springs)
-
-
-def _without_interval(shift: float) -> ShiftVerdict:
-    return "no result" if math.isnan(shift) else "unclear"
 
 
 def _of_interval(ci: tuple[float, float], margin: float) -> ShiftVerdict:

@@ -14,7 +14,6 @@ from numpy.typing import NDArray
 
 from sandmould.runs.columns import REPLICATE, SEED
 from sandmould.runs.formatting import setting_text
-from sandmould.statistics.contrasts import Spread
 from sandmould.statistics.mean_tests import CONFIDENCE, MeanTest
 
 WIDE_MEASURE, WIDE_KEY = 100.0, 30.0
@@ -139,16 +138,6 @@ def by_block(
         return values.rename(index=lambda row: ("row", row))
     rows = summary.loc[values.index, blocks]
     return pd.Series(values.to_numpy(), index=[tuple(r) for r in rows.to_numpy().tolist()])
-
-
-def compare(
-    best: Setting, others: Sequence[Setting], spread: Spread, are_logarithms: bool = False
-) -> tuple[Comparison, ...]:
-    """The best minus each other setting, nearest first; over it where these are logarithms."""
-    return tuple(
-        Comparison.of(other.label, *spread.compare(best.label, other.label), are_logarithms)
-        for other in others
-    )
 
 
 def _factor(logarithm: float) -> float:

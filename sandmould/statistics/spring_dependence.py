@@ -18,9 +18,8 @@ import scipy
 from numpy.typing import NDArray
 
 from sandmould.runs.columns import PART, SWEEP
-from sandmould.statistics.config import Objective, fewest_points
+from sandmould.statistics.config import SPRINGS, ControlCase, Objective, fewest_points
 from sandmould.statistics.contrasts import Contrasts
-from sandmould.statistics.control_case import SPRINGS, ControlCase
 from sandmould.statistics.evidence import usable_values
 from sandmould.statistics.mean_tests import CONFIDENCE
 from sandmould.statistics.optimum import Optimum, find_optimum
@@ -151,7 +150,9 @@ def assess_springs(
             for case in here
         ]
         if hold == own_hold:
-            swept = table[(table[PART] == SWEEP) & _is_certified(table, key, mine)]
+            # at frequencies of the control alone, so that curves are as well known
+            certified = table.loc[table[PART].isin([c.part for c in mine]), key].unique()
+            swept = table[(table[PART] == SWEEP) & table[key].isin(certified)]
             own = ControlCase(SPRINGS, "x1", 1.0, hold=hold)
             curves.append(_curve(swept, key, objective, own))
         verdicts[hold] = _judge(hold, sorted(curves, key=lambda curve: curve.factor), blind)
@@ -176,11 +177,6 @@ def _rows(
         twins = [c.part for c in cases if c.hold == own_hold and c.factor == case.factor]
         is_mine |= table[PART].isin(twins) & (table[key] == best_hz)
     return table[is_mine]
-
-
-def _is_certified(table: pd.DataFrame, key: str, cases: Sequence[ControlCase]) -> pd.Series[bool]:
-    """Whether runs stand at a frequency of the control, so that curves are as well known."""
-    return table[key].isin(table.loc[table[PART].isin([c.part for c in cases]), key].unique())
 
 
 def _curve(rows: pd.DataFrame, key: str, objective: Objective, case: ControlCase) -> SpringCurve:

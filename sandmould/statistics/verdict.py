@@ -15,7 +15,6 @@ from sandmould.statistics.evidence import usable_values
 from sandmould.statistics.settings import (
     Comparison,
     Setting,
-    compare,
     is_wide,
     number_blocks,
     setting_of,
@@ -76,12 +75,7 @@ def compare_settings(
     unlike numbers of replicates). Where means differ more than a hundredfold, see ``is_wide``, all
     this is done with the logarithms: the scatter of the large ones would hide the small ones.
 
-    Parameters
-    ----------
-    summary : DataFrame
-        One row a run, from :func:`sandmould.study.collect.collect`.
-    better : {"larger", "smaller", "neither"}
-        Which values are better.
+    ``summary``: one row a run, see ``collect``.
     """
     in_blocks = usable_values(summary, measure).set_axis(number_blocks(summary))
     groups = [(at, len(rows), in_blocks.iloc[rows].dropna()) for at, rows in
@@ -123,7 +117,10 @@ def _ranked(
         return [], (), None
     spread = Spread.of({k: v.map(math.log) for k, v in values.items()} if by_logarithm else values)
     used.sort(key=lambda s: spread.mean(s.label), reverse=better == "larger")
-    comparisons = compare(used[0], used[1:], spread, by_logarithm)
+    comparisons = tuple(
+        Comparison.of(s.label, *spread.compare(used[0].label, s.label), by_logarithm)
+        for s in used[1:]
+    )
     if by_logarithm and not any(c.tested for c in comparisons):
         return _ranked(settings, values, better, by_logarithm=False)
     return used, comparisons, spread
@@ -132,12 +129,9 @@ def _ranked(
 def rank_runs(summary: pd.DataFrame, measure: str, better: Better = "larger") -> dict[str, str]:
     """Best, median and worst usable run by the objective.
 
-    Returns
-    -------
-    dict
-        ``best``, ``median`` and ``worst`` to the run's name, ``highest``, ``median`` and
-        ``lowest`` where neither is better; fewer where fewer runs are usable. Of an even number of
-        runs the better of the two middle ones is the median.
+    Gives ``best``, ``median`` and ``worst`` to the run's name, ``highest``, ``median`` and
+    ``lowest`` where neither is better; fewer where fewer runs are usable. Of an even number of runs
+    the better of the two middle ones is the median.
     """
     first, last = ("highest", "lowest") if better == "neither" else ("best", "worst")
     values = usable_values(summary, measure).dropna()
@@ -153,11 +147,8 @@ def rank_runs(summary: pd.DataFrame, measure: str, better: Better = "larger") ->
 def further_replicates(comparisons: Sequence[Comparison], best: Setting) -> int | None:
     """How many more replicates would tell the best from those that it cannot be told from.
 
-    Returns
-    -------
-    int or None
-        Of each of these settings, if their differences are as large as they seem. None where
-        nothing is open, or where too few replicates tell.
+    So many of each of these settings, if their differences are as large as they seem. None where
+    nothing is open, or where too few replicates tell.
     """
     open_ones = [c for c in comparisons if c.tested and not c.separated]
     tests = [c.test for c in open_ones if c.test is not None]

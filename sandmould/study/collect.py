@@ -198,12 +198,7 @@ def gather(
 ) -> Collected:
     """Read every run of a study; what is missing becomes NaN, what is broken is told in ``detail``.
 
-    Parameters
-    ----------
-    study_folder : Path
-        ``results/<study>`` with ``runs.tsv`` and ``runs/<run>/``.
-    own_measures : mapping of str to str, optional
-        Formulas of the study's own measures, by name.
+    ``own_measures``: formulas of the study's own measures, by name.
 
     Raises
     ------

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 import trimesh
 
-from sandmould.kinds.sand.notes import notes
+from sandmould.kinds.sand.planning import SandPlanning
 from tests.verification.cases.bench import RADIUS_M, Array, Bench, law, scene
 from tests.verification.cases.case import RefusedCase
 
@@ -35,7 +35,9 @@ def rebounds(engine: str, file: Path) -> dict[str, Array]:
     obstacle = {"kind": "mesh", "name": "block", "file": str(file), "unit_m": 1.0}
     given = scene(engine, 3, 1, (RADIUS_M,), of_walls, of_walls, 2e-6, obstacles=[obstacle])
     # The plan says where the engine is wrong.
-    assert ("Edges" in {note.about for note in notes(given)}) == (engine == "liggghts")
+    assert ("Edges" in {note.about for note in SandPlanning().notes(given)}) == (
+        engine == "liggghts"
+    )
     found = {}
     with Bench(given) as bench:
         for place, offset in OFFSETS.items():

@@ -7,14 +7,14 @@ import time
 
 from sandmould import SHIPPED
 from sandmould.runs.columns import SWEEP
-from sandmould.runs.words import say
+from sandmould.runs.parent import say
 from sandmould.bad_input import BAD_INPUT_EXIT, BadInputError
 from sandmould.execution.cluster.settings import goes_to_slurm, may_be_elsewhere
 from sandmould.execution.cluster.submission import open_submission
 from sandmould.execution import jobs
 from sandmould.execution.locks import hold_turn
 from sandmould.execution.pool import start_server
-from sandmould.execution.spent import note_spent
+from sandmould.runs.products import note_spent
 from sandmould.study.plan.batches import alone, read_batches, write_batches
 from sandmould.study.plan.announcement import announce, prepare
 from sandmould.study.plan.build_plan import (

@@ -9,9 +9,8 @@ from collections.abc import Sequence
 from pathlib import Path
 
 from sandmould.bad_input import BadInputError, Problem
-from sandmould.execution.cluster.limits import Demand, answer, limits
 from sandmould.execution.cluster.queue import DRIVER, PREFIX, driver_of
-from sandmould.execution.cluster.settings import read_cluster
+from sandmould.execution.cluster.settings import Demand, answer, limits, read_cluster
 from sandmould.study.plan.build_plan import RESULTS, checked_plan, writing
 
 DEMAND = Demand(ranks=1, cores_a_rank=1, memory_mb=4000)  # most of it for the report

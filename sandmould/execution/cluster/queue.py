@@ -14,10 +14,9 @@ from pathlib import Path
 from typing import NamedTuple
 
 from sandmould.bad_input import BadInputError
-from sandmould.execution.cluster.limits import answer, minutes
+from sandmould.execution.cluster.settings import LIMIT_S, answer, minutes
 
 _FIELDS = "%i|%T|%r|%M|%l|%N|%C|%S|%k|%j|%Z"
-_LIMIT_S = 60.0
 PREFIX = "sandmould"
 """Of names of jobs, by our profile."""
 DRIVER = "driver_of_"
@@ -165,7 +164,7 @@ def cancel(jobs: Sequence[Job]) -> None:
     """Take jobs out of the queue."""
     if jobs:
         numbers = [job.number for job in jobs]
-        subprocess.run(["scancel", *numbers], capture_output=True, timeout=_LIMIT_S, check=False)
+        subprocess.run(["scancel", *numbers], capture_output=True, timeout=LIMIT_S, check=False)
 
 
 def queue_lines(jobs: Sequence[Job]) -> list[str]:

@@ -8,13 +8,16 @@ import time
 from collections.abc import Mapping, Sequence
 from typing import Any
 
-from sandmould.execution.cluster.limits import Demand, JobLimits, check_jobs, limits
 from sandmould.execution.cluster.queue import Job, cancel, jobs_of
 from sandmould.execution.cluster.settings import (
     RESOURCES,
     WORD,
     Cluster,
+    Demand,
+    JobLimits,
+    check_jobs,
     goes_to_slurm,
+    limits,
     read_cluster,
 )
 from sandmould.runs.progress import duration_text
@@ -125,12 +128,8 @@ class Submission:
 def open_submission(plan: Plan, arguments: Sequence[str], stated: Mapping[str, Any]) -> Submission:
     """How the jobs of a start go to where its options say.
 
-    Parameters
-    ----------
-    arguments : sequence of str
-        Snakemake's command line.
-    stated : mapping
-        Its default resources, which hold where ``cluster.yaml`` says nothing.
+    ``arguments``: Snakemake's command line; ``stated``: its default resources, which hold where
+    ``cluster.yaml`` says nothing.
 
     Raises
     ------

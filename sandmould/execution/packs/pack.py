@@ -43,10 +43,7 @@ def pack(
     Films and pictures of earlier moments are not to be had from such runs any more, their tables
     are. Copies of files from outside the study's folder go along if ``outside_files`` asks so.
 
-    Returns
-    -------
-    str
-        What was packed, what was left out and why.
+    Says what was packed, what was left out and why.
 
     Raises
     ------
@@ -95,13 +92,7 @@ def pack(
 
 
 def _files_of(place: Path, anew: Path, last_state: bool, others: Container[str]) -> dict[str, Path]:
-    """Files of a run at its end without others; what is new for its last state goes into ``anew``.
-
-    Raises
-    ------
-    ValueError
-        Why it cannot be packed.
-    """
+    """Files of a run at its end, new ones in ``anew``; ``ValueError`` where it cannot be packed."""
     manifest = read_manifest(place)
     if why := change(place, manifest):
         raise ValueError(why)

@@ -27,10 +27,7 @@ _WORK = "work"
 def unpack(path: Path, results: Path) -> str:
     """Take the runs of a pack that are not here yet, while no start computes the study.
 
-    Returns
-    -------
-    str
-        What was taken, what was not and why.
+    Says what was taken, what was not and why.
 
     Raises
     ------

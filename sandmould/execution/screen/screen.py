@@ -15,14 +15,12 @@ from rich.live import Live
 
 from sandmould.execution.cluster.queue import Job, Outlook, jobs_of, outlook
 from sandmould.execution.screen.run_watch import Ended, Running, RunWatch, failure, file_time_s
-from sandmould.execution.screen.table import counts_text, study_table, times_text
-from sandmould.execution.screen.view import StudyView
-from sandmould.execution.time_left import TimeLeft
+from sandmould.execution.screen.table import StudyView, counts_text, study_table, times_text
+from sandmould.runs.parent import Words
 from sandmould.runs.progress import duration_text
-from sandmould.runs.words import Words
 from sandmould.study.plan.announcement import stored_speeds
 from sandmould.study.plan.build_plan import Plan
-from sandmould.study.plan.price import computed_wall_s
+from sandmould.study.plan.price import TimeLeft, computed_wall_s
 
 if TYPE_CHECKING:
     from sandmould.execution.screen.so_far import SoFar
@@ -55,15 +53,9 @@ class Screen:
     ) -> None:
         """Look at what is there.
 
-        Parameters
-        ----------
-        live : bool, optional
-            Whether to draw a table again and again; by default where stderr is a terminal that
-            can.
-        submits : bool
-            Whether runs are computed by jobs of Slurm, on its cores.
-        begun_s : float, optional, s
-            When the command began, on the clock of ``time.monotonic``; now unless it is given.
+        ``live``: whether to draw a table again and again; by default where stderr is a terminal
+        that can. ``submits``: whether runs are computed by jobs of Slurm, on its cores.
+        ``begun_s``: when the command began, on the clock of ``time.monotonic``; now unless given.
         """
         self._folder = results / plan.study.name
         logs = self._folder / "logs"

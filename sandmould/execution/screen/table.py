@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
+from dataclasses import dataclass
+
 from rich.cells import cell_len, set_cell_size
 from rich.console import Group, RenderableType
 from rich.table import Table
 from rich.text import Text
 
-from sandmould.execution.screen.run_watch import Running
-from sandmould.execution.screen.view import StudyView
+from sandmould.execution.screen.run_watch import Ended, Running
 from sandmould.runs.progress import duration_text
 
 _FEWEST_ROWS = 3
@@ -18,12 +19,47 @@ _NAME_SHARE = 0.4
 """Of the width, that names of runs take at most."""
 
 
+@dataclass(frozen=True)
+class StudyView:
+    """A study that is being computed."""
+
+    name: str
+    runs: int
+    """All of the study, those of earlier starts included."""
+    done: int
+    """Those that reached their end."""
+    running: tuple[tuple[Running, float], ...]
+    """Runs that are being computed, each with the time that it will still take, s."""
+    waiting: int
+    filling: int
+    """Of what is running, the fills that runs share; they are no runs."""
+    passed_s: float
+    """Since this start."""
+    left_s: float
+    """Until the report is written."""
+    share: float
+    """Of the time of this start, that has passed."""
+    so_far: str
+    """What the runs say; empty before the first has a value."""
+    ended: tuple[Ended, ...]
+    """Runs of this start that reached their end, the last one last."""
+    failures: tuple[Ended, ...]
+    """All that failed, the last one last."""
+    awaits: str = ""
+    """What the queue of a cluster has to do first; nobody knows when that is."""
+
+    @property
+    def now(self) -> str:
+        """What is being done or waited for, where no run is computed."""
+        return self.awaits or ("" if self.running or self.waiting else "tables and report")
+
+
 def study_table(view: StudyView, width: int, height: int) -> RenderableType:
     """Lay out a study for a terminal, no higher than it is.
 
     States are words, never colours alone.
     """
-    head = [_counts(view), _whole(view, width)]
+    head = [Text.assemble((view.name, "bold"), f"  {counts_text(view)}"), _whole(view, width)]
     if view.so_far:
         head.append(Text(f"So far: {view.so_far}", style="bold"))
     above = sum(-(-cell_len(text.plain) // width) for text in head)
@@ -61,10 +97,6 @@ def times_text(view: StudyView) -> str:
     left = f"about {duration_text(view.left_s)} left" if view.left_s >= 1.0 else "soon done"
     doing = f", {view.now}" if view.now else ""
     return f"{duration_text(view.passed_s)} passed, {left}{doing}"
-
-
-def _counts(view: StudyView) -> Text:
-    return Text.assemble((view.name, "bold"), f"  {counts_text(view)}")
 
 
 def _whole(view: StudyView, width: int) -> Text:

@@ -6,9 +6,9 @@ import math
 from pathlib import Path
 
 from sandmould.definition.run import Run
-from sandmould.kinds.deck.measure import draw_measures, measure_deck
 from sandmould.kinds.deck.own import computation
 from sandmould.kinds.deck.own import deck as own_deck
+from sandmould.kinds.deck.own.measures import draw_measures, measure_deck
 from sandmould.kinds.kind import Execution
 from sandmould.runs.files import write_text
 from sandmould.runs.products import Computed, Cost

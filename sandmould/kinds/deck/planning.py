@@ -66,7 +66,7 @@ class DeckPlanning(Planning[OwnDeck]):
             (Measure("<measure>", "What scenario.measures takes of the log or of a dump."),),
         ),
     )
-    measuring = ("sandmould/kinds/deck/measure.py", "sandmould/kinds/deck/own/measures.py")
+    measuring = ("sandmould/kinds/deck/own/measures.py",)
 
     def measured_by(self, scenario: OwnDeck) -> str:
         """With the measures that are asked for: all of the log and its dumps are kept."""
@@ -75,9 +75,9 @@ class DeckPlanning(Planning[OwnDeck]):
 
     def unmeasurable(self, scenario: OwnDeck, folder: Path) -> list[str]:
         """Measures whose columns stand neither in the log of a run nor in its dumps."""
-        from sandmould.kinds.deck import measure
+        from sandmould.kinds.deck.own import measures
 
-        return measure.unmeasurable(scenario, folder)
+        return measures.unmeasurable(scenario, folder)
 
     def resolved(self, scenario: OwnDeck) -> OwnDeck:
         """With the hashes of its files; that of its deck comes with the seed."""

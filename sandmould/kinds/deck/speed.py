@@ -24,15 +24,13 @@ from sandmould.digest import SHORT, digest
 from sandmould.engines.registry import engine_module
 from sandmould.kinds.deck.own import computation
 from sandmould.kinds.deck.own import deck as own_deck
-from sandmould.kinds.deck.own.columns import missing_columns
 from sandmould.kinds.deck.own.measures import measured
 from sandmould.kinds.deck.own.thermo import LOGGED, STEP
-from sandmould.kinds.stored_speed import StoredSpeed
+from sandmould.kinds.kind import StoredSpeed
 from sandmould.runs.files import write_text
 from sandmould.runs.formatting import display_number, name_of
-from sandmould.runs.parent import end_with_parent, print_to
+from sandmould.runs.parent import end_with_parent, print_to, say
 from sandmould.runs.templates import worded
-from sandmould.runs.words import say
 from sandmould.scenario.own_deck import OwnDeck
 
 FAILED_LOG = "pilot_failed.log"
@@ -88,12 +86,8 @@ class DeckSpeed(StoredSpeed[OwnDeck]):
 def pilot(scenario: OwnDeck, results: Path, pilot_s: float = PILOT_S) -> tuple[float | None, str]:
     """Compute the deck for some seconds in a folder of its own, in one piece and gone on with.
 
-    Parameters
-    ----------
-    scenario : OwnDeck
-        One of several ranks has no pilot.
-    results : Path
-        Folder of all results, which keeps the log of a pilot that failed.
+    A scenario of several ranks has no pilot. ``results``: folder of all results, which keeps the
+    log of a pilot that failed.
 
     Returns
     -------
@@ -139,7 +133,7 @@ def _computed(scenario: OwnDeck, folder: Path, pilot_s: float) -> tuple[float | 
 def _lacks(scenario: OwnDeck, series: pd.DataFrame) -> str:
     """Say which columns the log of a pilot has not printed yet."""
     logged = [str(name).removeprefix(LOGGED) for name in series]
-    missing = missing_columns(scenario, logged) if len(series) else ""
+    missing = own_deck.missing_columns(scenario, logged) if len(series) else ""
     return f"in its first seconds {missing.rstrip('.')}" if missing else ""
 
 

@@ -12,8 +12,7 @@ from sandmould.casting.mps import computation, scene, source_hash
 from sandmould.casting.mps.shoulder import PAPERS, POUR_M_S
 from sandmould.casting.mps.stability_measures import beyond_map
 from sandmould.kinds.casting import CastingPlanning
-from sandmould.kinds.kind import BASE_MEMORY_MB, SpeedClass
-from sandmould.kinds.stored_speed import StoredSpeed
+from sandmould.kinds.kind import BASE_MEMORY_MB, SpeedClass, StoredSpeed
 from sandmould.limits import FRAMES, PARTICLES, RECORDS
 from sandmould.runs.measures import once, read_groups
 from sandmould.runs.templates import Note, notes

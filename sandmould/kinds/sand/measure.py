@@ -15,7 +15,7 @@ from sandmould.analysis.coordination import contacts
 from sandmould.analysis.deflection import fill_under
 from sandmould.analysis.density import apparent_density
 from sandmould.analysis.layers import mixing_index
-from sandmould.analysis.loose_zones import LooseSand
+from sandmould.analysis.loose_zones import LooseSand, find_loose_sand
 from sandmould.analysis.reached_space import reached_share
 from sandmould.analysis.solid_fraction import (
     bed_surface_height_m,
@@ -27,19 +27,24 @@ from sandmould.definition.run import LAST_MEASURED
 from sandmould.engines.snapshot import Snapshot, scene_at
 from sandmould.engines.snapshot_file import stored_snapshots
 from sandmould.geometry.geometry import Cavity, Scene
-from sandmould.kinds.sand.drive import add_drive
-from sandmould.kinds.sand.loose import (
-    LOOSE_ZONES,
-    add_loose_sand,
-    last_loose_sand,
-    write_loose_zones,
-)
+from sandmould.kinds.sand.measures import seeks_loose_sand
 from sandmould.kinds.sand.moments import MOMENTS, list_moments, nearest
 from sandmould.kinds.sand.outflow import add_outflow, measure_outflow
-from sandmould.runs.columns import OVERLAP_P99_FRACTION
+from sandmould.runs.columns import OVERLAP_P99_FRACTION, STAGE, VIBRATION_TIME_S
 from sandmould.runs.files import replaced
+from sandmould.runs.products import TABLE_PERIODS
 from sandmould.scenario.checks.cavities import free_share
+from sandmould.scenario.drive import BoxDrive, laid_down_drive, steady_drive
 from sandmould.scenario.scenario import Scenario
+from sandmould.scenario.stages import StageKind
+from sandmould.scenario.vibration import VibrationStage
+
+LOOSE_ZONES = "loose_zones.tsv"
+_COLUMNS = (
+    "x_from_m", "y_from_m", "z_from_m", "x_to_m", "y_to_m", "z_to_m", "volume_m3",
+    "solid_fraction", "side", "near",
+)  # fmt: skip
+_NO_DRIVE = BoxDrive(np.nan, np.nan)
 
 
 def measure_snapshot(scenario: Scenario, snapshot: Snapshot) -> dict[str, Any]:
@@ -185,3 +190,79 @@ def write_measures(
     table = add_loose_sand(table, loose)
     with replaced(out) as partial:
         table.to_csv(partial, sep="\t", index=False, float_format="%.8g")
+
+
+def last_loose_sand(scenario: Scenario, folder: Path) -> LooseSand | None:
+    """Find the loose sand of a run's last snapshot; None where none is sought, or there is none."""
+    moments = list_moments(folder) if seeks_loose_sand(scenario) else ()
+    if not moments:
+        return None
+    last = moments[-1].load()
+    grain_m = scenario.sand.mass_median_diameter_m
+    return find_loose_sand(last.position_m, last.radius_m, scene_at(scenario, last), grain_m)
+
+
+def add_loose_sand(table: pd.DataFrame, loose: LooseSand | None) -> pd.DataFrame:
+    """Put what was found into the last row of the measures."""
+    if loose is None or table.empty:
+        return table
+    largest = loose.zones[0].measure if loose.zones else 0.0
+    columns = {
+        "loose_fraction": loose.loose_fraction,
+        "loose_under_fraction": loose.side_fraction["under"],
+        "loose_over_fraction": loose.side_fraction["over"],
+        "loose_beside_fraction": loose.side_fraction["beside"],
+        "loose_away_fraction": loose.side_fraction["away"],
+        "loose_zones": len(loose.zones),
+        "largest_loose_zone_m3": largest,
+    }
+    for name, value in columns.items():
+        table.loc[table.index[-1], name] = value
+    return table
+
+
+def write_loose_zones(loose: LooseSand, out: Path) -> None:
+    """Write a row a zone, the largest first."""
+    rows = [(*z.low_m, *z.high_m, z.measure, z.solid_fraction, z.side, z.near) for z in loose.zones]
+    table = pd.DataFrame(rows, columns=list(_COLUMNS))
+    table.to_csv(out, sep="\t", index=False, float_format="%.6g")
+
+
+def add_drive(scenario: Scenario, table: pd.DataFrame, folder: Path) -> pd.DataFrame:
+    """Add the amplitudes of the box's motion up to each snapshot.
+
+    ``table``: measures of a run's snapshots, in order of time.
+
+    Gaps stand before the first vibration; in a rest, the amplitudes of the vibration before it.
+    """
+    if not scenario.vibrations:
+        return table
+    path = folder / TABLE_PERIODS
+    periods = pd.read_csv(path, sep="\t") if path.exists() else None
+    stages = {
+        StageKind.VIBRATE.numbered(number): stage
+        for number, stage in enumerate(scenario.vibration, start=1)
+        if isinstance(stage, VibrationStage)
+    }
+    drives, current = [], ""
+    for name, time_s in zip(table[STAGE], table[VIBRATION_TIME_S], strict=True):
+        current = str(name) if str(name) in stages else current
+        drive = _drive(current, stages[current], time_s, periods) if current else _NO_DRIVE
+        drives.append(drive.columns())
+    columns = pd.DataFrame(drives, columns=list(_NO_DRIVE.columns()), index=table.index)
+    return pd.concat([table, columns], axis=1)
+
+
+def _drive(
+    name: str, stage: VibrationStage, time_s: float, periods: pd.DataFrame | None
+) -> BoxDrive:
+    """Amplitudes of a stage up to a time of vibration."""
+    if stage.unbalance is None:
+        return laid_down_drive(stage)
+    if periods is None:
+        return _NO_DRIVE
+    # Half a period: the clock of a snapshot and the end of a period differ by round-off.
+    until_s = time_s + 0.5 / stage.frequency_hz
+    ended = periods[(periods[STAGE] == name) & (periods[VIBRATION_TIME_S] <= until_s)]
+    values = (ended[c].to_numpy(dtype=np.float64) for c in ("displacement_m", "phase_deg"))
+    return steady_drive(stage, *values) or _NO_DRIVE

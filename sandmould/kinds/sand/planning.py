@@ -5,7 +5,9 @@ from __future__ import annotations
 import math
 from collections.abc import Iterable, Iterator, Mapping
 from pathlib import Path
-from typing import TypeVar
+from typing import Any, TypeVar
+
+import numpy as np
 
 from sandmould import pattern_fe
 from sandmould.bad_input import Problem
@@ -13,19 +15,22 @@ from sandmould.digest import digest
 from sandmould.engines import registry
 from sandmould.engines.durations import grain_steps, run_s, shaken_step_s, stage_steps
 from sandmould.engines.program import build_program
+from sandmould.kernel_cache import are_compiled
 from sandmould.kinds.kind import BASE_MEMORY_MB, Planning, SpeedClass
 from sandmould.kinds.sand.measures import MEASURES
-from sandmould.kinds.sand.notes import notes
+from sandmould.kinds.sand.narrow import narrow_spaces, thin_walls
 from sandmould.kinds.sand.speed import SandSpeed
 from sandmould.kinds.sand.table_motion import table_lines
 from sandmould.limits import FRAMES, RECORDS
 from sandmould.runs.hashing import scenario_hash
-from sandmould.runs.templates import Note
+from sandmould.runs.templates import Note, notes
+from sandmould.scenario.cavities import MeshCavity
 from sandmould.scenario.checks.scene import problems as scene_problems
+from sandmould.scenario.hardness import LEAST_KAPPA, bed_hardness
 from sandmould.scenario.pattern import MeshFile, PatternDrawing, Placed
 from sandmould.scenario.placement import plan_counts
 from sandmould.scenario.scenario import Scenario
-from sandmould.scenario.solids import READ_BYTES, SolidMesh, with_hash
+from sandmould.scenario.solids import READ_BYTES, SolidMesh, drawn_part, drawn_surface, with_hash
 
 MEASURING = (
     *(f"sandmould/analysis/{name}.py" for name in (
@@ -34,9 +39,14 @@ MEASURING = (
         "sections", "solid_fraction", "tube_fill",
     )),
     *(f"sandmould/kinds/sand/{name}.py" for name in (
-        "bending", "drive", "loose", "measure", "moments", "outflow",
+        "bending", "measure", "moments", "outflow",
     )),
 )  # fmt: skip
+HIGH_ACCELERATION_G = 20.0
+"""Peak acceleration above which a plan asks whether the amplitude is meant so."""
+COMPILE_S = 55.0
+"""Processor time for what a first run compiles in lanes: 58 s measured in 2D, 50 s in 3D (an AMD
+EPYC with AVX2, idle)."""
 STEPPED_COPIES = 8
 """Matrices of a surface held together while the masses of the in-step scheme are found."""
 GRAINS_PER_MB = 50
@@ -210,7 +220,38 @@ class SandPlanning(Planning[Scenario]):
 
     def notes(self, scenario: Scenario) -> tuple[Note, ...]:
         """Stiffness, narrow places, thin walls, and what is hardly meant."""
-        return notes(scenario)
+        box_m = np.array(scenario.box.size_m(scenario.dimension))
+        places = {"obstacles": scenario.obstacles, "cavities": scenario.cavities}
+        drawn = {
+            f"{key}.{n}": drawn_part(it, box_m)
+            for key, solids in places.items()
+            for n, it in enumerate(solids)
+            if isinstance(it, SolidMesh) and not getattr(it, "hollow", None)
+        }
+        return notes(
+            "plan_sand.j2",
+            grains_m=[each.diameter_m for each in scenario.sand.classes(scenario.dimension)],
+            scale=scenario.sand.size_scale,
+            hardness=bed_hardness(scenario),
+            least=LEAST_KAPPA,
+            narrow=narrow_spaces(scenario),
+            compiles=registry.calls_our_kernels(scenario) and not are_compiled("dem"),
+            compile_s=COMPILE_S,
+            beyond_reason=[
+                stage
+                for stage in scenario.vibrations
+                if stage.unbalance is None and stage.peak_acceleration_g > HIGH_ACCELERATION_G
+            ],
+            walls=thin_walls(scenario),
+            drawings=drawn,
+            hollows={
+                f"cavities.{n}": scenario.scene.cavities[n].space
+                for n, it in enumerate(scenario.cavities)
+                if isinstance(it, MeshCavity) and it.hollow
+            },
+            edges=scenario.engine.name == "liggghts" and bool(scenario.scene.meshes),
+            **_of_pattern(scenario),
+        )
 
     def settings_lines(self, scenarios: Iterable[Scenario]) -> list[str]:
         """What is asked of the vibrating table."""
@@ -241,3 +282,22 @@ def _stepped_components(scenario: Scenario) -> int:
     from sandmould.pattern_fe.scene import pattern_of  # see resolved
 
     return pattern_of(scenario).surface.vertices_m.size
+
+
+def _of_pattern(scenario: Scenario) -> dict[str, Any]:
+    """What a drawn pattern measures, and how good its mesh is."""
+    if scenario.pattern is None or not isinstance(scenario.pattern.shape, PatternDrawing):
+        return {"pattern": None}
+    from sandmould.pattern_fe.nearest import nearest_on_facets
+    from sandmould.pattern_fe.quality import mesh_sentence
+    from sandmould.pattern_fe.scene import pattern_of
+
+    pattern = pattern_of(scenario)
+    drawn_m, _ = drawn_surface(scenario.pattern.shape, "pattern.shape")
+    drawn_m = drawn_m + np.array(scenario.pattern.position_m)
+    _, _, place_m = nearest_on_facets(drawn_m, pattern.surface.vertices_m[pattern.surface.facets])
+    return {
+        "pattern": drawn_part(scenario.pattern.shape, np.array(scenario.box.size_m(3))),
+        "pattern_mesh": mesh_sentence(scenario, pattern),
+        "off_mm": 1e3 * float(np.linalg.norm(place_m - drawn_m, axis=1).max()),
+    }

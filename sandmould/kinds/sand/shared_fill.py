@@ -15,8 +15,7 @@ from sandmould.engines.program import Program, build_program
 from sandmould.runs import checkpoint_folders as checkpoints
 from sandmould.runs.hashing import scenario_hash
 from sandmould.runs.outcome import Outcome, RunOutcome
-from sandmould.runs.products import SAND_TABLES, Computed
-from sandmould.runs.shared_state import has_begun, lay_checkpoint, lay_tables
+from sandmould.runs.products import SAND_TABLES, Computed, Cost
 
 
 def lay_fill(run: Run, folder: Path, program: Program) -> Computed | None:
@@ -26,10 +25,7 @@ def lay_fill(run: Run, folder: Path, program: Program) -> Computed | None:
 
     ``folder``: ``results/<study>/runs/<run>``; the fills of the study lie beside the runs.
 
-    Returns
-    -------
-    Computed or None
-        How the run ends where the fill failed: as that did.
+    Gives how the run ends where the fill failed: as that did.
     """
     if not run.fill:
         return None
@@ -46,46 +42,52 @@ def lay_fill(run: Run, folder: Path, program: Program) -> Computed | None:
 
 
 def _lay(run: Run, folder: Path, program: Program) -> RunOutcome | None:
-    work, fill, scenario = folder / "work", folder.parent.parent / FILLS / run.fill, run.scenario
-    if has_begun(work):
+    work, fill = folder / "work", folder.parent.parent / FILLS / run.fill
+    if any(work.glob("checkpoint_[ab]")):
         return None
     try:
         ended = RunOutcome.read(fill / "outcome.json")
-        lay_tables(fill, work, SAND_TABLES)
+        work.mkdir(parents=True, exist_ok=True)
+        for name in SAND_TABLES:  # in place of its own: it writes on in them
+            if (fill / name).exists():
+                shutil.copyfile(fill / name, work / name)
         if ended.outcome is not Outcome.FINISHED:
             detail = f"in the fill {run.fill}, which it shares: {ended.detail}"
             return replace(ended, detail=detail, planned_s=run_s(program))
-        lay_checkpoint(
-            fill / checkpoints.END_CHECKPOINT,
-            work,
-            scenario_hash(scenario.before_vibration),
-            scenario_hash(scenario),
-            cost_before(scenario),
-            program.fill_stages,
-            run.fill,
-        )
+        _lay_checkpoint(run, fill / checkpoints.END_CHECKPOINT, work, program.fill_stages)
     except (OSError, ValueError, KeyError, TypeError) as error:
         why = f"the fill {run.fill} cannot be used ({error}), and the run fills by itself"
         print(f"{run.run}: {why}", file=sys.stderr)
     return None
 
 
+def _lay_checkpoint(run: Run, source: Path, work: Path, stages: int) -> None:
+    """Give a run the checkpoint of its fill as its newest; ``ValueError`` where that is no good.
+
+    It pays for what it computes itself, and has the steps, the grains and the largest overlap of
+    the whole.
+    """
+    mark = checkpoints.read_mark(source, scenario_hash(run.scenario.before_vibration))
+    taken = Cost(**mark.cost)
+    cost = replace(
+        cost_before(run.scenario),
+        steps=taken.steps,
+        grains=taken.grains,
+        largest_overlap_fraction=taken.largest_overlap_fraction,
+        fill=run.fill,
+    )
+    own_hash = scenario_hash(run.scenario)
+    mark = replace(mark, scenario_hash=own_hash, cost=cost.row(), shared_stages=stages)
+    checkpoints.lay(source, work / "checkpoint_a", mark)
+
+
 def fill_apart(run: Run, folder: Path, program: Program, opening: Opening) -> Computed | None:
     """Compute the fill of a run as a shared fill is computed, and lay its end as a checkpoint.
 
-    So a run ends alike whether it shares its fill or not.
+    So a run whose scenario has ``rest.shaken_check_every_s`` ends alike whether it shares its fill
+    or not.
 
-    Parameters
-    ----------
-    run : Run
-        Whose scenario has ``rest.shaken_check_every_s``.
-    opening : callable
-        Opens a session.
-
-    Returns
-    -------
-    Computed or None
-        How the run ends where its fill did not finish; None once it may vibrate.
+    Gives how the run ends where its fill did not finish; None once it may vibrate.
     """
     work, run_hash = folder / "work", scenario_hash(run.scenario)
     newest, _ = checkpoints.newest_checkpoint(work)

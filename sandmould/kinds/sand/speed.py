@@ -10,7 +10,7 @@ from pathlib import Path
 from sandmould.engines import registry
 from sandmould.engines.program import build_program
 from sandmould.engines.session import EngineStop, Session
-from sandmould.kinds.stored_speed import StoredSpeed
+from sandmould.kinds.kind import StoredSpeed
 from sandmould.scenario.fill import Fill, Layer, Settling
 from sandmould.scenario.placement import fall_s
 from sandmould.scenario.scenario import Scenario

@@ -1,4 +1,4 @@
-"""What measured values say of two parameters: Bayes' rule on a grid."""
+"""What measured values say of two parameters, by Bayes' rule on a grid, and which is worth most."""
 
 from __future__ import annotations
 
@@ -11,13 +11,15 @@ import numpy as np
 from numpy.typing import NDArray
 
 from sandmould.runs.templates import worded
-from sandmould.statistics.calibration.config import Target
+from sandmould.statistics.config import Target
 from sandmould.statistics.emulator import Emulator
 
 Array = NDArray[np.float64]
 GRID = 121
 """Points along each axis: a posterior a tenth of the range wide still has a dozen across."""
 CREDIBLE = 0.95
+TRUTHS = 5
+"""Planted truths along each axis, the edges of the map left out."""
 
 
 class OffTheMapError(ValueError):
@@ -165,3 +167,59 @@ def iso_line(emulator: Emulator, target: Target) -> IsoLine:
         if len(inside):
             low[j], high[j] = first[inside[0]], first[inside[-1]]
     return IsoLine(second, line, low, high)
+
+
+@dataclass(frozen=True)
+class Worth:
+    """What measuring something once tells of the two parameters, on average over the map."""
+
+    measure: str
+    bits_alone: float
+    bits_added: float
+    """Beside the first measure."""
+    cpu_s: float
+    """Of one run that gives it, beyond the run that gives the first."""
+
+
+def worths(
+    emulators: Mapping[str, Emulator], first: str, cpu_s: Mapping[str, float]
+) -> list[Worth]:
+    """Average information of each measure over planted truths, the richest addition first.
+
+    A truth's value is the emulator's, known as well as one run knows it.
+
+    Parameters
+    ----------
+    first : str
+        The measure that is there already.
+    cpu_s : mapping of measure to float, s
+        Extra processor time of each.
+    """
+    base = emulators[first]
+    share = (np.arange(TRUTHS) + 0.5) / TRUTHS
+    truths = [base.low + (base.high - base.low) * np.array([a, b]) for a in share for b in share]
+    alone = {m: _mean_bits(emulators, [m], truths) for m in emulators}
+    worth_of_each = [
+        Worth(
+            m, alone[m], _mean_bits(emulators, [first, m], truths) - alone[first], cpu_s.get(m, 0.0)
+        )
+        for m in emulators
+        if m != first
+    ]
+    return sorted(worth_of_each, key=lambda worth: -worth.bits_added)
+
+
+def _mean_bits(
+    emulators: Mapping[str, Emulator], measures: Sequence[str], truths: Sequence[np.ndarray]
+) -> float:
+    bits = []
+    for truth in truths:
+        targets = {
+            m: Target(
+                value=float(emulators[m].at(truth[None])[0][0]),
+                sd=max(emulators[m].noise_sd, 1e-12),
+            )
+            for m in measures
+        }
+        bits.append(posterior(emulators, targets).bits)
+    return float(np.mean(bits))

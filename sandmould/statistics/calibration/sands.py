@@ -16,15 +16,16 @@ from sandmould.runs.files import write_text
 from sandmould.runs.templates import worded
 from sandmould.scenario.quantity import fields_at
 from sandmould.scenario.scenario import Scenario
-from sandmould.statistics.calibration.config import Calibration, TargetSand
-from sandmould.statistics.calibration.information import Worth, worths
 from sandmould.statistics.calibration.posterior import (
     IsoLine,
     OffTheMapError,
     Posterior,
+    Worth,
     iso_line,
     posterior,
+    worths,
 )
+from sandmould.statistics.config import Calibration, TargetSand
 from sandmould.statistics.emulator import Emulator, TooFewRunsError, fit_emulator
 from sandmould.statistics.evidence import usable_values
 
@@ -129,14 +130,9 @@ def _calibrate_sand(
 def material_text(
     calibrated: CalibratedSand, keys: tuple[str, str], scenario: Scenario, study: str
 ) -> str:
-    """A calibrated sand as a material file: the study's sand with two values found.
+    """A calibrated sand, which has a posterior, as a material file: with two values found.
 
-    Parameters
-    ----------
-    calibrated : CalibratedSand
-        With a posterior.
-    scenario : Scenario
-        Of any run: all but the swept keys is the same.
+    ``scenario``: of any run: all but the swept keys is the same.
     """
     assert calibrated.posterior is not None
     parts = {"sand", "contact", "background_damping"}

@@ -10,10 +10,9 @@ from typing import Literal
 
 from sandmould.bad_input import BadInputError, Problem
 from sandmould.definition.run import FILL
-from sandmould.kinds.kind import AnyScenario, SpeedClass
-from sandmould.kinds.stored_speed import StoredSpeed
+from sandmould.kinds.kind import AnyScenario, SpeedClass, StoredSpeed
+from sandmould.runs.parent import say
 from sandmould.runs.progress import duration_text
-from sandmould.runs.words import say
 from sandmould.study.plan.batches import Batch, mark_done
 from sandmould.study.plan.build_plan import Plan, writing
 from sandmould.study.plan.lacking import WHOLE, Lack, Need, note_lacks
@@ -68,10 +67,7 @@ def prepare(
 
     ``found``: what runs lack; ``plan.lacks`` says so unless it is given.
 
-    Returns
-    -------
-    str
-        Which runs are computed or measured again, and why.
+    Says which runs are computed or measured again, and why.
     """
     folder = results / plan.study.name
     with writing(folder):

@@ -7,7 +7,6 @@ import math
 from collections.abc import Container, Iterable, Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import NamedTuple
 
 from sandmould.definition.run import FILL, FILLS, LAST_MEASURED, Run
 from sandmould.kinds.registry import kind_of
@@ -36,14 +35,6 @@ class Batch:
     side_by_side: int = 1
 
 
-class _Alike(NamedTuple):
-    """What runs of one batch have in common."""
-
-    engine: str
-    threads: int
-    ranks: int
-
-
 def planned_wall_s(run: Run) -> float:
     """Wall time that batches count on for a run, in a job that is there already."""
     return START_S + predicted_s(run)
@@ -58,29 +49,25 @@ def plan_batches(
     so that runs that are appended later move nothing but the last batch. Where it is known how many
     cores are free, batches are made so much shorter that all cores end together.
 
-    Parameters
-    ----------
-    cores : int
-        That a job should have; runs that leave some of them free are computed side by side. One
-        run under MPI has a job's cores for itself.
-    free_cores : int
-        That jobs find free; 0 where that is not known, as on a cluster.
-    least : int
-        Runs that a batch should have, where it is made shorter.
+    ``cores``: that a job should have; runs that leave some of them free are computed side by side.
+    One run under MPI has a job's cores for itself. ``free_cores``: that jobs find free; 0 where
+    that is not known, as on a cluster. ``least``: runs that a batch should have, where it is made
+    shorter.
     """
-    alike: dict[_Alike, list[Run]] = {}
+    alike: dict[tuple[str, int, int], list[Run]] = {}
     for run in runs:
         planning, scenario = kind_of(run.scenario).planning, run.scenario
         engine, _ = planning.speed_class(scenario)
-        key = _Alike(engine, planning.threads(scenario), planning.ranks(scenario))
+        key = engine, planning.threads(scenario), planning.ranks(scenario)
         alike.setdefault(key, []).append(run)
     batches = []
-    for key, chosen in alike.items():
-        beside = 1 if key.ranks > 1 else max(1, cores // key.threads)
-        at_once = free_cores // (key.threads * beside)
+    for (_, threads, ranks), chosen in alike.items():
+        beside = 1 if ranks > 1 else max(1, cores // threads)
+        at_once = free_cores // (threads * beside)
         parts = _filled(chosen, wall_s * beside)
         if at_once:
-            long, short = _apart(chosen, wall_s * beside)
+            long = [run for run in chosen if planned_wall_s(run) >= wall_s * beside]
+            short = [run for run in chosen if planned_wall_s(run) < wall_s * beside]
             parts = [*([run] for run in long), *_even(short, len(parts), at_once, least)]
         batches += [Batch(part[0].run, tuple(part), min(beside, len(part))) for part in parts]
     return batches
@@ -97,12 +84,6 @@ def _filled(runs: Sequence[Run], wall_s: float) -> list[list[Run]]:
         parts[-1].append(run)
         filled_s += planned_wall_s(run)
     return parts
-
-
-def _apart(runs: Sequence[Run], wall_s: float) -> tuple[list[Run], list[Run]]:
-    """Runs that last long enough by themselves, and the others."""
-    long = [run for run in runs if planned_wall_s(run) >= wall_s]
-    return long, [run for run in runs if planned_wall_s(run) < wall_s]
 
 
 def _even(runs: Sequence[Run], parts: int, at_once: int, least: int) -> list[list[Run]]:

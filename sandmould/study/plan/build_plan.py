@@ -15,22 +15,28 @@ from sandmould import SHIPPED
 from sandmould.bad_input import BadInputError, Problem
 from sandmould.definition.certificate import provisional_hz
 from sandmould.definition.comparing import ENGINE
-from sandmould.definition.run import Run
+from sandmould.definition.run import RUN_NAME, Run
 from sandmould.definition.sweep import Point, points
 from sandmould.kinds.kind import AnyScenario, Kind, Planning, SpeedClass
 from sandmould.kinds.registry import kind_named, kind_of
 from sandmould.plain_file import UNREADABLE
-from sandmould.runs.manifest import OUTCOME_FILE
+from sandmould.runs.hashing import scenario_hash
+from sandmould.runs.manifest import MANIFEST_FILE, OUTCOME_FILE, read_manifest
 from sandmould.study.plan.batches import Batch, plan_batches
 from sandmould.study.plan.expand import expand, swept_key
 from sandmould.study.plan.fills import planned_work, share_fills
 from sandmould.study.plan.grain_check import affordable_runs
-from sandmould.study.plan.kept_names import under_kept_names
 from sandmould.study.plan.lacking import Lack, Need, lack_of, lacks
-from sandmould.study.plan.later_key import at_later_key
-from sandmould.study.plan.load_study import OpenStudy, StudyFile, study_files, study_of
+from sandmould.study.plan.load_study import (
+    OpenStudy,
+    StudyFile,
+    at_later_key,
+    study_files,
+    study_of,
+)
 from sandmould.study.plan.measured import problems_elsewhere
 from sandmould.study.plan.ownership import check_owner
+from sandmould.study.plan.plan_files import SCENARIO_FILE, read_run
 from sandmould.study.plan.trust import check_letters, check_places, check_trust
 from sandmould.study.rounds.round_log import RoundLog, read_rounds
 
@@ -213,7 +219,7 @@ def planned_runs(study: OpenStudy, log: RoundLog, folder: Path) -> list[Run]:
     runs = expand(study, log.runs, log.certified_hz)
     if log.coarsened:
         runs += affordable_runs(study, log.coarsened, runs)
-    return under_kept_names(runs, folder)
+    return _under_kept_names(runs, folder)
 
 
 def _misfits(files: Sequence[StudyFile]) -> set[str]:
@@ -325,3 +331,38 @@ def writing(folder: Path, key: str = "results") -> Iterator[None]:
     except OSError as error:
         valid = f"a folder that takes files: {error.filename or 'it'} does not ({error.strerror})"
         raise BadInputError([Problem(key, str(folder), valid)]) from None
+
+
+def _under_kept_names(runs: Sequence[Run], folder: Path) -> list[Run]:
+    """Runs of a study, each by the name of the folder that holds it, where one does.
+
+    A name begins with the swept keys, so it changes when a study sweeps one more; it ends with
+    the replicate and the hash of the scenario, which stay.
+    """
+    places = folder / "runs"
+    there = {path.name for path in places.iterdir()} if places.is_dir() else set()
+    free = there - {run.run for run in runs}
+    by_end = {_end(name): name for name in sorted(free) if re.fullmatch(RUN_NAME, name)}
+    kept = []
+    for run in runs:
+        name = by_end.get(_end(run.run), "") if run.run not in there else ""
+        if name and _hash_of(places / name) == scenario_hash(run.scenario):
+            del by_end[_end(name)]
+            run = replace(run, run=name)
+        kept.append(run)
+    return kept
+
+
+def _end(name: str) -> str:
+    """Replicate and hash, with which the name of a run ends."""
+    return name.rpartition("_r")[2]
+
+
+def _hash_of(folder: Path) -> str:
+    """Of the run that lies in a folder; empty where that cannot be read."""
+    try:
+        if (folder / MANIFEST_FILE).exists():
+            return str(read_manifest(folder)["origin"]["scenario_sha256"])
+        return scenario_hash(read_run(folder / SCENARIO_FILE).scenario)
+    except (BadInputError, *UNREADABLE):
+        return ""

@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from dataclasses import replace
+from functools import partial
 from typing import Any
 
 import numpy as np
@@ -58,22 +59,17 @@ def expand(
     measured : bool, optional
         Whether the runs must have the measures that the study asks for; not to draw them.
 
-    Returns
-    -------
-    list of Run
-        Points in the order of the sweep, the replicates of a point together; those of the cross
-        check after those of its point, those of the rounds and of the certificate last.
+    Points come in the order of the sweep, the replicates of a point together; those of the cross
+    check after those of its point, those of the rounds and of the certificate last.
 
     Raises
     ------
     BadInputError
         When a point cannot be run; a value that came with the sweep is named at its swept key.
     """
-    base = study.study.scenario.model_dump(mode="json")
     problems: dict[str, Problem] = {}
     runs: dict[str, Run] = {}
-    kind = kind_named(study.study.kind)
-    labels = Labels(kind.scenario, kind.labels_have_units)
+    opened = _opener(study)
     every = range(1, study.study.replicates + 1)
     planned = points(study.study.sweep, study.study.scenario)
     swept = [(point, every) for point in planned]
@@ -88,7 +84,7 @@ def expand(
     added += [(point, seeds) for point in controlled.values()]
     beyond: list[_AtPoint] = []
     for point, replicates in (*swept, *added):
-        at_point = _AtPoint(study, base, point, labels, measured)
+        at_point = opened(point, measured)
         if replicates is every and at_point.table_limit:
             beyond.append(at_point)
             continue
@@ -111,7 +107,7 @@ def expand(
                 break
             runs[run.run] = run
     for step, point in controlled.items():
-        at_point = _AtPoint(study, base, point, labels)
+        at_point = opened(point)
         for case in cases(certificate, study.study.scenario, certified_hz[1]):
             if step not in case.steps:
                 continue
@@ -127,17 +123,8 @@ def expand(
 
 
 def coarser_runs(study: OpenStudy, point: Point, replicates: Iterable[int]) -> list[Run]:
-    """Runs of a point with coarser grains; none where no engine can compute them.
-
-    Parameters
-    ----------
-    study : OpenStudy
-    point : Point
-    replicates : iterable of int
-    """
-    base = study.study.scenario.model_dump(mode="json")
-    kind = kind_named(study.study.kind)
-    at_point = _AtPoint(study, base, point, Labels(kind.scenario, kind.labels_have_units))
+    """Runs of a point with coarser grains; none where no engine can compute them."""
+    at_point = _opener(study)(point)
     if at_point.scenario is None or at_point.problems:
         return []
     scenario, wrong = at_point.changed(COARSER)
@@ -167,11 +154,9 @@ def scenes(study: OpenStudy) -> Iterator[AnyScenario]:
     BadInputError
         At a point whose values have a wrong type.
     """
-    base = study.study.scenario.model_dump(mode="json")
-    kind = kind_named(study.study.kind)
-    labels = Labels(kind.scenario, kind.labels_have_units)
+    opened = _opener(study)
     for point in points(study.study.sweep, study.study.scenario):
-        at_point = _AtPoint(study, base, point, labels)
+        at_point = opened(point)
         if at_point.scenario is None:
             raise BadInputError(at_point.problems)
         yield at_point.scenario
@@ -181,7 +166,7 @@ class _AtPoint:
     """The scenario of one point of a sweep."""
 
     def __init__(
-        self, study: OpenStudy, base: Tree, point: Point, labels: Labels, measured: bool = True
+        self, study: OpenStudy, base: Tree, labels: Labels, point: Point, measured: bool = True
     ) -> None:
         self.measured = measured
         self.study, self.base, self.point, self.labels = study, base, point, labels
@@ -342,6 +327,13 @@ class _AtPoint:
                 {**sources, "seed": f"replicate {replicate} of seed {own} ({sources['seed']})"},
                 part,
             )
+
+
+def _opener(study: OpenStudy) -> Callable[..., _AtPoint]:
+    """Opens points of a study, which share its scenario and get labels of their own."""
+    kind = kind_named(study.study.kind)
+    labels = Labels(kind.scenario, kind.labels_have_units)
+    return partial(_AtPoint, study, study.study.scenario.model_dump(mode="json"), labels)
 
 
 def _vibrated_for(duration_s: float, scenario: Scenario) -> Scenario:

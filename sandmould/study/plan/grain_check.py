@@ -21,18 +21,8 @@ from sandmould.study.robustness.controls import COARSER
 def affordable_runs(study: OpenStudy, best: Sequence[Point], planned: Sequence[Run]) -> list[Run]:
     """Runs with coarser grains at the best setting and the next.
 
-    Parameters
-    ----------
-    best : sequence of Point
-        The best first.
-    planned : sequence of Run
-        Of the sweep and its rounds.
-
-    Returns
-    -------
-    list of Run
-        Both settings with equally many replicates, or the best alone, or none: fewer than
-        ``FEWEST`` tell nothing.
+    Both with equally many replicates, or the best alone, or none: fewer than ``FEWEST`` tell
+    nothing. ``best``: the best first; ``planned``: of the sweep and its rounds.
     """
     planning = kind_named(study.study.kind).planning
     allowed = study.study.grain_price_share * _work(planned, planning)

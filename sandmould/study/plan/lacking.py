@@ -155,10 +155,7 @@ def note_lacks(runs: Iterable[Run], found: dict[str, Lack], folder: Path) -> str
 
     ``found``: what those that are not whole lack, see ``lacks``.
 
-    Returns
-    -------
-    str
-        Which runs are computed or measured again, and why; empty where none is.
+    Says which runs are computed or measured again, and why; empty where none is.
     """
     begun = (folder / "summary.tsv").exists() or (folder / "batches").exists()
     for each in runs:

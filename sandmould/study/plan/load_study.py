@@ -6,7 +6,7 @@ import contextlib
 import difflib
 import os
 import re
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
 from pathlib import Path
@@ -16,14 +16,7 @@ from pydantic import BaseModel
 
 from sandmould import ROOT, SHIPPED
 from sandmould.bad_input import BadInputError, Problem, display_path
-from sandmould.definition import (
-    calibration,
-    certificate,
-    comparing,
-    own_measures,
-    refinement,
-    sweep,
-)
+from sandmould.definition import certificate, comparing, own_measures, refinement, sweep
 from sandmould.definition.study import Study
 from sandmould.kinds.kind import Kind
 from sandmould.kinds.registry import DEFAULT_KIND, KINDS, kind_named
@@ -122,9 +115,8 @@ def study_of(files: Sequence[StudyFile]) -> OpenStudy:
     problems = sweep.problems(study.sweep, study.scenario, study.replicates) or [
         *own_measures.problems(study.own_measures, study.sweep.swept),
         *comparing.problems(study),
-        *_reported(study),
         *study.problems(),
-        *calibration.problems(study.calibration, study.sweep),
+        *comparing.calibration_problems(study.calibration, study.sweep),
         *refinement.problems(
             study.refine, study.sweep, study.scenario, study.objective.better, study.replicates
         ),
@@ -147,13 +139,6 @@ def _kind(files: Sequence[StudyFile]) -> Kind[Any]:
             valid = f"{below.name}, the kind of {files[n - 1].name}, which this study is based on"
             raise BadInputError([Problem("kind", kind.name, valid, file.name)])
     return kind
-
-
-def _reported(study: Study) -> Iterator[Problem]:
-    """Best values by others need the one key that they are values of."""
-    if study.objective.reported_best and len(study.sweep.swept) != 1:
-        values = [best.value for best in study.objective.reported_best]
-        yield Problem("objective.reported_best", values, "absent unless one key is swept")
 
 
 def study_files(path: Path, text: str | None = None) -> list[StudyFile]:
@@ -292,3 +277,44 @@ def _units(tree: Any, key: str = "") -> Iterator[tuple[str, Any, Any]]:
 def _declared_units(model: type[BaseModel], key: str) -> list[str]:
     # The values of a swept key have its unit.
     return units_at(model, re.sub(r"^sweep\.(keys|points\.\d+)\.", "scenario.", key))
+
+
+def at_later_key(
+    problem: Problem,
+    files: Sequence[StudyFile],
+    misfits: Callable[[Sequence[StudyFile]], set[str]],
+) -> Problem:
+    """Tell a misfit at the key that changed, where the key that it was found at did not.
+
+    ``files``: as of ``study_files``; ``misfits``: keys of the misfits that some files alone have.
+    """
+    of_material = not problem.key.startswith("scenario.") and problem.file not in {
+        file.name for file in files
+    }
+    if of_material or problem.sentence:
+        return problem
+    number = len(files) - 1
+    while number and problem.key in misfits(files[:number]):
+        number -= 1
+    file, below = files[number], files[:number]
+    if not number or problem.file == file.name:
+        return problem
+    brought = _brought(
+        file.tree, lambda tree: problem.key in misfits([*below, replace(file, tree=tree)])
+    )
+    if brought is None:
+        return problem
+    where = f"{problem.key} of {problem.file}, here {problem.value}"
+    return Problem(*brought, f"one with which {where}, is {problem.valid}", file.name)
+
+
+def _brought(tree: Tree, brings: Callable[[Tree], bool]) -> tuple[str, Any] | None:
+    """The deepest key, with its value, that brings a misfit by itself."""
+    for name, value in tree.items():
+        if brings({name: value}):
+            inner = None
+            # what has a kind, or a value and its unit, is one
+            if isinstance(value, dict) and not {"kind", "value"} & set(value):
+                inner = _brought(value, lambda part, name=name: brings({name: part}))  # type: ignore[misc]
+            return (f"{name}.{inner[0]}", inner[1]) if inner else (name, value)
+    return None

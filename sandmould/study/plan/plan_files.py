@@ -30,7 +30,7 @@ from sandmould.runs.progress import duration_text
 from sandmould.runs.templates import Note
 from sandmould.scenario.quantity import Section
 from sandmould.scenario.reading import Origin, read_planned, validated
-from sandmould.statistics.control_case import SPRINGS
+from sandmould.statistics.config import SPRINGS
 from sandmould.statistics.grain_check import FACTOR
 from sandmould.study.plan.fills import planned_work
 from sandmould.study.plan.price import Prices, study_s

@@ -19,10 +19,7 @@ def outside(study: OpenStudy, scenario: AnyScenario) -> list[Problem]:
 
     ``scenario``: that of any point, since files can be swept.
 
-    Returns
-    -------
-    list of Problem
-        Keys from the study's root.
+    Problems have their keys from the study's root.
     """
     program = kind_named(study.study.kind).planning.program
     if program is None:

@@ -68,13 +68,7 @@ def find_contenders(summary: pd.DataFrame, study: Study, keys: list[str]) -> Con
 
 
 def best_points(summary: pd.DataFrame, study: Study, keys: list[str]) -> tuple[Point, ...]:
-    """The setting with the best mean and the next best, or what there is of them.
-
-    Parameters
-    ----------
-    summary, study, keys
-        As of ``find_contenders``.
-    """
+    """The setting with the best mean and the next best, or what there is of them."""
     verdict = compare_settings(summary, keys, study.objective.measure, study.objective.better)
     if verdict.best is None:
         return ()

@@ -14,8 +14,7 @@ from sandmould.runs.columns import CPU_S, REPLICATE, total_s
 from sandmould.runs.formatting import listed, name_of, number, setting_text, unit_of
 from sandmould.runs.templates import worded
 from sandmould.statistics.emulator import TooFewRunsError
-from sandmould.statistics.optimum import Optimum, find_optimum
-from sandmould.statistics.propose import propose
+from sandmould.statistics.optimum import Optimum, find_optimum, propose
 from sandmould.study.rounds.contenders import best_points, find_contenders, why_decided
 from sandmould.study.rounds.round_log import Round, RoundLog
 
@@ -35,9 +34,10 @@ def next_runs(log: RoundLog, study: Study, summary: pd.DataFrame, keys: list[str
     if not log.ended or not study.certificate.controls or log.certified_hz:
         return log
     try:
-        return choose_controls(log, study, summary, keys)
+        optimum = find_optimum(summary, keys, study.objective.measure, study.objective.better)
     except TooFewRunsError as error:
         return replace(log, ended=f"No robustness checks: {error}.")
+    return replace(log, certified_hz=round_best_hz(optimum.setting[keys[0]]))
 
 
 def next_round(log: RoundLog, study: Study, summary: pd.DataFrame, keys: list[str]) -> RoundLog:
@@ -79,19 +79,6 @@ def _of_rounds(log: RoundLog, study: Study, summary: pd.DataFrame, keys: list[st
     mine |= {(point[key], r) for point, r in log.runs}
     rows = zip(summary[key], summary[REPLICATE], strict=True)
     return summary[[row in mine for row in rows]]
-
-
-def choose_controls(
-    log: RoundLog, study: Study, summary: pd.DataFrame, keys: list[str]
-) -> RoundLog:
-    """Choose the frequencies of the controls: the best, one below and one above.
-
-    Raises
-    ------
-    TooFewRunsError
-    """
-    optimum = find_optimum(summary, keys, study.objective.measure, study.objective.better)
-    return replace(log, certified_hz=round_best_hz(optimum.setting[keys[0]]))
 
 
 def next_replicates(

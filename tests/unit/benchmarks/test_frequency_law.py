@@ -20,7 +20,7 @@ from benchmarks.frequency_law.groups import (
 from benchmarks.frequency_law.page import COLLAPSED, HELD_OUT, OF_THE_TUBE, _recorded, fill_map
 from benchmarks.frequency_law.series import FREQUENCY, MEASURE, series_of
 from sandmould.execution.records import RECORDS
-from sandmould.kinds.sand.fill_map import MAP
+from sandmould.kinds.sand.table_motion import MAP
 from sandmould.runs.columns import OUTCOME_CODE, REPLICATE, SEED
 from sandmould.scenario.scenario import Scenario
 

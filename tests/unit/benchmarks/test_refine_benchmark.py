@@ -10,7 +10,7 @@ import pytest
 from scipy.stats import norm
 
 from benchmarks.calibration.refine import best_guess, chance, design, next_point
-from sandmould.statistics.calibration.config import Target
+from sandmould.statistics.config import Target
 from sandmould.statistics.emulator import fit_emulator
 
 LOW, HIGH = (0.1, 0.0), (0.8, 0.3)

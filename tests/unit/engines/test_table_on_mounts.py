@@ -15,7 +15,7 @@ from sandmould.engines.recording import Recorder
 from sandmould.engines.reference.session import ReferenceSession
 from sandmould.engines.registry import engine_problem
 from sandmould.engines.table_periods import TablePeriod
-from sandmould.kinds.sand.drive import add_drive
+from sandmould.kinds.sand.measure import add_drive
 from sandmould.runs.checkpoint_folders import CheckpointMark
 from sandmould.runs.outcome import Outcome
 from sandmould.runs.products import TABLE_PERIODS

@@ -15,8 +15,8 @@ from snakemake.resources import Resources
 from sandmould import ROOT
 from sandmould.bad_input import BadInputError
 from sandmould.execution.cluster.driver import replace_driver, submit_driver
-from sandmould.execution.cluster.limits import minutes
 from sandmould.execution.cluster.queue import JOB_START_S, Outlook, end_jobs, jobs_of, outlook
+from sandmould.execution.cluster.settings import minutes
 from sandmould.execution.cluster.submission import Submission, open_submission
 from sandmould.execution.run_study import run_study
 from sandmould.execution.status import status_text

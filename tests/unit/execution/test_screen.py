@@ -18,10 +18,9 @@ from sandmould.execution.screen.ending import last_line, trouble
 from sandmould.execution.screen.run_watch import Ended, Running, RunWatch
 from sandmould.execution.screen.screen import Screen
 from sandmould.execution.screen.so_far import so_far_text
-from sandmould.execution.screen.table import counts_text, study_table
-from sandmould.execution.screen.view import StudyView
+from sandmould.execution.screen.table import StudyView, counts_text, study_table
 from sandmould.kinds.sand.speed import SandSpeed
-from sandmould.runs import words
+from sandmould.runs import parent
 from sandmould.runs.manifest import save_manifest
 from sandmould.runs.outcome import Outcome, RunOutcome
 from sandmould.study.plan.build_plan import Plan, open_plan
@@ -197,15 +196,15 @@ def test_words_of_processes_come_through_whole(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:
     monkeypatch.delenv("SANDMOULD_WORDS", raising=False)
-    words.say("to the terminal")
+    parent.say("to the terminal")
     assert capsys.readouterr().err == "to the terminal\n"
-    heard = words.Words(tmp_path / "words.txt")
+    heard = parent.Words(tmp_path / "words.txt")
     monkeypatch.setattr(os, "environ", heard.environment())
-    words.say("the plan")
+    parent.say("the plan")
     with (tmp_path / "words.txt").open("a") as half:
         half.write("half a ")
     assert heard.new() == "the plan\n"
-    words.say("line")
+    parent.say("line")
     assert heard.new() == "half a line\n"
     assert capsys.readouterr().err == ""
 

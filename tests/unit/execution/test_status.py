@@ -12,7 +12,7 @@ import pytest
 import yaml
 
 from sandmould.engines.registry import deck_hash
-from sandmould.execution.settled import is_settled, note_settled
+from sandmould.execution.run_study import is_settled, note_settled
 from sandmould.execution.status import run_status, status_text
 from sandmould.kinds.sand.kind import SAND
 from sandmould.runs.claim import CLAIM_FILE

@@ -11,7 +11,7 @@ from numba import prange
 from sandmould import called_kernels
 from sandmould.called_kernels import keep_kernels, kept_kernels, load_kernels, loaded_kernels
 from sandmould.compiled import njit
-from sandmould.execution.loading import load_for
+from sandmould.execution.jobs import load_for
 from tests.scenes import tube_scene
 
 

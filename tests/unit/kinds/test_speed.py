@@ -15,9 +15,9 @@ from typer.testing import CliRunner
 from sandmould import ROOT
 from sandmould.cli.commands import app
 from sandmould.engines.session import Session
+from sandmould.kinds.kind import StoredSpeed
 from sandmould.kinds.registry import kind_of
 from sandmould.kinds.sand.speed import SandSpeed, _spent_s, _window_rate
-from sandmould.kinds.stored_speed import StoredSpeed
 from sandmould.study.plan.expand import expand
 from sandmould.study.plan.load_study import open_study
 from tests.liggghts_scenes import needs_liggghts

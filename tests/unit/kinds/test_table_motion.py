@@ -9,7 +9,7 @@ from typing import Any
 import pytest
 import yaml
 
-from sandmould.kinds.sand.fill_map import best_by_records
+from sandmould.kinds.sand.table_motion import best_by_records
 from sandmould.study.plan.expand import expand
 from sandmould.study.plan.load_study import open_study
 from sandmould.study.plan.plan_files import plan_table

@@ -9,7 +9,7 @@ import pandas as pd
 import pytest
 
 from sandmould.engines.snapshot import Snapshot
-from sandmould.kinds.sand.loose import (
+from sandmould.kinds.sand.measure import (
     LOOSE_ZONES,
     add_loose_sand,
     last_loose_sand,

@@ -10,12 +10,12 @@ import pandas as pd
 import pytest
 import yaml
 
-from sandmould.definition.calibration import problems
+from sandmould.definition.comparing import calibration_problems
 from sandmould.definition.sweep import Sweep
 from sandmould.scenario.scenario import Scenario
-from sandmould.statistics.calibration.config import Calibration, Target
 from sandmould.statistics.calibration.posterior import OffTheMapError, iso_line, posterior
 from sandmould.statistics.calibration.sands import calibrate, write_materials
+from sandmould.statistics.config import Calibration, Target
 from sandmould.statistics.emulator import Emulator, TooFewRunsError, fit_emulator
 
 KEYS = ("contact.grain_grain.friction", "contact.grain_grain.rolling_arm_fraction")
@@ -178,7 +178,7 @@ def test_another_study_adds_its_columns_and_its_cost() -> None:
 def test_a_sweep_that_cannot_be_calibrated_is_told(keys: dict[str, object], valid: str) -> None:
     target = {"heap_angle_deg": {"value": 25.0, "sd": 0.5}}
     asked = Calibration.model_validate({"sands": [{"name": "a", "targets": target}]})
-    found = list(problems(asked, Sweep.model_validate({"keys": keys})))
+    found = list(calibration_problems(asked, Sweep.model_validate({"keys": keys})))
     assert valid in found[0].valid
 
 
@@ -186,4 +186,4 @@ def test_names_of_sands_differ() -> None:
     sand = {"name": "a", "targets": {"heap_angle_deg": {"value": 25.0, "sd": 0.5}}}
     asked = Calibration.model_validate({"sands": [sand, sand]})
     sweep = Sweep.model_validate({"keys": {KEYS[0]: [0.1], KEYS[1]: [0.1]}})
-    assert [p.key for p in problems(asked, sweep)] == ["calibration.sands.1.name"]
+    assert [p.key for p in calibration_problems(asked, sweep)] == ["calibration.sands.1.name"]

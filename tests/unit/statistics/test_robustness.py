@@ -27,7 +27,7 @@ from sandmould.study.plan.expand import expand
 from sandmould.study.plan.fills import share_fills
 from sandmould.study.plan.load_study import OpenStudy, open_study
 from sandmould.study.robustness.controls import BY_FACTOR, SHAKEN_HZ, Case, cases
-from sandmould.study.rounds.decide import choose_controls, next_round
+from sandmould.study.rounds.decide import next_round, next_runs
 from sandmould.study.rounds.round_log import RoundLog, basis_of, read_rounds, write_rounds
 from sandmould.wording.robustness import robustness_sentences
 
@@ -388,7 +388,7 @@ def test_frequencies_are_chosen_round_the_optimum_and_anew_after_more_rounds(
 ) -> None:
     study = opened(tmp_path, refine={"rounds": 2, "runs": 3}).study
     table = planted(lambda part, f: hill(f, BEST_HZ), [], 0.002)
-    log = choose_controls(RoundLog(basis_of(study)), study, table, [FREQUENCY])
+    log = next_runs(RoundLog(basis_of(study)), opened(tmp_path).study, table, [FREQUENCY])
     low, best, high = log.certified_hz
     assert best == pytest.approx(BEST_HZ, rel=0.06)
     assert (low, high) == pytest.approx((best / 1.41, best * 1.41), rel=0.01)

@@ -13,8 +13,7 @@ from scipy import stats
 from sandmould.bad_input import BadInputError
 from sandmould.definition.certificate import round_best_hz, spanned_hz
 from sandmould.scenario.reading import Origin, validated
-from sandmould.statistics.config import Objective, SandWaveSpeed
-from sandmould.statistics.control_case import SPRINGS, ControlCase
+from sandmould.statistics.config import SPRINGS, ControlCase, Objective, SandWaveSpeed
 from sandmould.statistics.recommendation import ModelWaveSpeed, Recommendation, Why, recommend
 from sandmould.statistics.robustness import Robustness, assess_robustness
 from sandmould.statistics.spring_dependence import (

@@ -132,9 +132,9 @@ class Jobs:
         self.stops = stops
         monkeypatch.setattr(jobs, "do", self.do)
         monkeypatch.setattr(jobs, "start_server", lambda scenarios: None)
-        monkeypatch.setattr(jobs, "render", self.render)
+        monkeypatch.setattr(jobs, "render_run", self.render)
         monkeypatch.setattr(jobs, "_simulate", self.compute)
-        monkeypatch.setattr(jobs, "measure", self.measure)
+        monkeypatch.setattr(jobs, "measure_run", self.measure)
 
     def do(self, work: Callable[..., int | None], *given: Any, log: Path, name: str) -> End:
         try:
@@ -142,7 +142,7 @@ class Jobs:
         except OSError as error:
             return End(1, str(error))
 
-    def render(self, run: Run, folder: Path) -> None:
+    def render(self, folder: Path, run: Run) -> None:
         (folder / "deck.in").write_text("run 1\n")
 
     def compute(self, folder: Path, ranks: int, mpi: str, run: Run) -> int:
@@ -155,7 +155,7 @@ class Jobs:
         RunOutcome(Outcome.FINISHED, "", 1.0, 1.0).write(folder / "outcome.json")
         return 0
 
-    def measure(self, run: Run, folder: Path) -> None:
+    def measure(self, folder: Path, run: Run) -> None:
         self.measured.append(folder.name)
         (folder / LAST_MEASURED).touch()
         code = kind_of(run.scenario).planning.measured_by(run.scenario)
@@ -194,12 +194,12 @@ def test_a_run_that_breaks_does_not_stop_the_others(
     folders = planned(tmp_path)
     done = Jobs(monkeypatch)
 
-    def measure(run: Run, folder: Path) -> None:
+    def measure(folder: Path, run: Run) -> None:
         if folder == folders[0]:
             raise OSError("no space left")
-        done.measure(run, folder)
+        done.measure(folder, run)
 
-    monkeypatch.setattr(jobs, "measure", measure)
+    monkeypatch.setattr(jobs, "measure_run", measure)
     with pytest.raises(JobError, match=f"1 of 3 stopped or broke: {folders[0].name}"):
         compute_all(folders, tmp_path / "log")
     assert f"{folders[0].name}: no space left" in capfd.readouterr().err

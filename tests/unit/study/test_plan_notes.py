@@ -16,7 +16,7 @@ from sandmould.casting.arpm import scene
 from sandmould.casting.arpm.estimates import cooled, freezes_s
 from sandmould.casting.arpm.raster import Raster
 from sandmould.casting.arpm.solidification import solidify
-from sandmould.kinds.sand import notes as notes_of_sand
+from sandmould.kinds.sand import planning as planning_of_sand
 from sandmould.scenario.checks.wall_thickness import thinnest_wall
 from sandmould.scenario.solids import SolidMesh, drawn_part, other_units, unit_hint
 from sandmould.study.plan.expand import expand
@@ -308,7 +308,7 @@ def test_poured_metal_without_collisions_is_told(tmp_path: Path) -> None:
 def test_what_is_to_be_compiled_is_told_once(
     compiled: bool, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr(notes_of_sand, "are_compiled", lambda room: compiled)
+    monkeypatch.setattr(planning_of_sand, "are_compiled", lambda room: compiled)
     path = tmp_path / "engines.yaml"
     path.write_text(
         yaml.safe_dump(
@@ -331,7 +331,7 @@ def test_what_is_to_be_compiled_is_told_once(
 def test_obstacles_thinner_than_a_grain_are_told(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr(notes_of_sand, "are_compiled", lambda room: True)
+    monkeypatch.setattr(planning_of_sand, "are_compiled", lambda room: True)
 
     def table(thickness_m: float) -> str:
         vertices = [[0.02, 0.02], [0.06, 0.02], [0.06, 0.02 + thickness_m],

@@ -6,7 +6,6 @@ import pytest
 
 from sandmould import ROOT
 from sandmould.definition.run import Run
-from sandmould.execution.time_left import TimeLeft
 from sandmould.kinds.kind import SpeedClass
 from sandmould.kinds.sand import planning
 from sandmould.kinds.sand.planning import (
@@ -23,6 +22,7 @@ from sandmould.study.plan.price import (
     END_S,
     Piece,
     Prices,
+    TimeLeft,
     foretold_s,
     ratios_of,
     spread_s,

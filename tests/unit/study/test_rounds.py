@@ -17,8 +17,7 @@ from sandmould.definition.certificate import SEEDS
 from sandmould.execution import run_study
 from sandmould.runs.manifest import save_manifest
 from sandmould.statistics.emulator import TooFewRunsError
-from sandmould.statistics.optimum import Optimum, find_optimum
-from sandmould.statistics.propose import NEAR, propose
+from sandmould.statistics.optimum import NEAR, Optimum, find_optimum, propose
 from sandmould.study.collect import collect
 from sandmould.study.plan.build_plan import Plan
 from sandmould.study.plan.expand import expand

@@ -15,8 +15,14 @@ import pandas as pd
 
 from sandmould.engines.registry import deck_reader, engine_module
 from sandmould.engines.session import EngineStop
-from sandmould.kinds.deck.own.columns import missing_columns
-from sandmould.kinds.deck.own.deck import OUTPUT, RESTART_FILES, check_unchanged, names_used, render
+from sandmould.kinds.deck.own.deck import (
+    OUTPUT,
+    RESTART_FILES,
+    check_unchanged,
+    missing_columns,
+    names_used,
+    render,
+)
 from sandmould.kinds.deck.own.measures import missing_dump
 from sandmould.kinds.deck.own.thermo import LOGGED, STEP, Thermo, read_thermo
 from sandmould.plain_file import UNREADABLE, read_json
@@ -113,9 +119,7 @@ def _wrong_end(scenario: OwnDeck, thermo: Thermo, went_on: bool) -> str:
     """Say that a deck did not end at the step that the study states; empty where it did.
 
     A deck may count its steps anew on the way: unless it went on from a restart file, those of
-    all its runs together may be the stated ones instead.
-
-    ``thermo``: of the last attempt.
+    all its runs together may be the stated ones instead. ``thermo``: of the last attempt.
     """
     if scenario.steps is None or thermo.table.empty:
         return ""

@@ -1,9 +1,10 @@
-"""The user's template: what keeps it from being rendered, and its deck."""
+"""The user's template: what keeps it from being rendered, its deck, and what that must print."""
 
 from __future__ import annotations
 
 import contextlib
-from collections.abc import Iterator
+import re
+from collections.abc import Iterator, Sequence
 from pathlib import Path
 
 from sandmould import SHIPPED
@@ -11,9 +12,8 @@ from sandmould.bad_input import BadInputError, Problem, display_path
 from sandmould.digest import digest, file_digest
 from sandmould.engines.capabilities import Ranks
 from sandmould.engines.registry import engine_module
-from sandmould.kinds.deck.own.columns import column_problems
 from sandmould.kinds.deck.own.template import MOST_CHARACTERS, names_in, rendered
-from sandmould.scenario.own_deck import RESERVED, OwnDeck
+from sandmould.scenario.own_deck import CLOCK, RESERVED, OwnDeck
 
 DECKS = SHIPPED / "config" / "decks"
 """Decks that come with us."""
@@ -21,6 +21,18 @@ OUTPUT = "output"
 """Folder that a deck runs in; all that it writes there is kept."""
 RESTART_FILES = ("restart.a", "restart.b")
 """Written in turn beside the folder that a deck runs in."""
+_HIDES = ("include", "jump", "python", "shell", "partition")
+"""Commands behind which a deck may print what its text does not show."""
+_OF_USER = re.compile(r"^[vcf]_\w+$")
+"""A column that LAMMPS heads as the deck names it."""
+_HEADINGS = {
+    "ke": "KinEng",
+    "pe": "PotEng",
+    "etotal": "TotEng",
+    "vol": "Volume",
+    "cpu": "CPU",
+}
+"""Of keywords that LAMMPS does not head by their own name with a capital."""
 
 
 def with_file_hashes(scenario: OwnDeck) -> OwnDeck:
@@ -92,7 +104,7 @@ def _template_problems(scenario: OwnDeck) -> Iterator[Problem]:
         if name not in used:
             valid = f"a name that the template uses: {', '.join(sorted(used - set(RESERVED)))}"
             yield Problem(f"values.{name}", scenario.values[name], valid)
-    yield from column_problems(scenario, deck)
+    yield from _column_problems(scenario, deck)
 
 
 def names_used(scenario: OwnDeck) -> frozenset[str]:
@@ -154,3 +166,67 @@ def check_unchanged(scenario: OwnDeck, is_rendered: bool = False) -> None:
         raise BadInputError(
             [Problem("file", display_path(scenario.paths[n]), valid) for n in changed]
         )
+
+
+def _column_problems(scenario: OwnDeck, deck: str) -> Iterator[Problem]:
+    """Tell columns that a rendered deck, by its text alone, will not print."""
+    printed = _printed(deck)
+    if printed is None:
+        return
+    if "time" not in printed:
+        valid = "a deck that prints the time: thermo_style custom step time ..."
+        yield Problem("template", scenario.template, valid)
+    for name, column in scenario.columns.items():
+        # LIGGGHTS heads columns by other names, and so do all engines those of their own.
+        if scenario.engine.name != "lammps":
+            continue
+        if _OF_USER.match(column) and column not in printed:
+            valid = f"a column that the deck prints: {', '.join(printed)}"
+            yield Problem(f"measures.{name}", column, valid)
+        elif column in printed and not _OF_USER.match(column):
+            heading = _HEADINGS.get(column, column.capitalize())
+            yield Problem(f"measures.{name}", column, f"its heading, {heading}")
+
+
+def _printed(deck: str) -> list[str] | None:
+    """Words of all ``thermo_style custom`` of a deck; None where its text does not show them."""
+    words: list[str] = []
+    for line in _command_words(deck):
+        command, *rest = line
+        if _hides(line) or (command == "thermo_modify" and {"line", "colname"} & set(rest)):
+            return None
+        if command == "thermo_style":
+            if rest[:1] != ["custom"] or any("$" in word or "*" in word for word in rest):
+                return None
+            words += [word for word in rest[1:] if word not in words]
+    return words or None
+
+
+def _hides(line: list[str]) -> bool:
+    """Whether a command reads what the text does not show; an ``if`` by one of its own, or prints.
+
+    A jump within the file hides nothing.
+    """
+    command, *rest = line
+    if command == "if":
+        words = [word.strip("\"'") for word in rest]
+        prints = any(word.startswith("thermo") for word in words)
+        return prints or any(_hides(words[k:]) for k in range(len(words)))
+    return command in _HIDES and (command, *rest[:1]) != ("jump", "SELF")
+
+
+def _command_words(deck: str) -> Iterator[list[str]]:
+    """Words of each command of a deck, lines that go on joined and comments left out."""
+    for line in re.sub(r"&[ \t]*\n", " ", deck).splitlines():
+        if words := line.partition("#")[0].split():
+            yield words
+
+
+def missing_columns(scenario: OwnDeck, columns: Sequence[str]) -> str:
+    """Say which columns a log lacks, or nothing."""
+    wanted = {"the time": CLOCK, **{f"measures.{n}": c for n, c in scenario.columns.items()}}
+    lacks = [f"{column} ({what})" for what, column in wanted.items() if column not in columns]
+    if not lacks:
+        return ""
+    has = ", ".join(columns) or "no table"
+    return f"the deck's log lacks the column {', '.join(lacks)}: it has {has}."

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterator
 from itertools import islice
 from pathlib import Path
@@ -10,20 +11,56 @@ import numpy as np
 import pandas as pd
 from numpy.typing import NDArray
 
+from sandmould.definition.run import LAST_MEASURED, PICTURE
+from sandmould.kinds.deck.own.deck import OUTPUT
 from sandmould.kinds.deck.own.thermo import LOGGED, STEP
+from sandmould.runs.files import replaced
 from sandmould.scenario.own_deck import OwnDeck, Taken
+
+
+def measure_deck(scenario: OwnDeck, folder: Path) -> None:
+    """Write the measures against time."""
+    series, each = _measured(scenario, folder)
+    time_s = series["time_s"] if "time_s" in series else pd.Series(dtype=float)
+    clock = {"time_s": time_s, "vibration_time_s": math.nan, "stage": "deck"}
+    table = pd.DataFrame({**clock, **each})
+    with replaced(folder / LAST_MEASURED) as partial:
+        table.to_csv(partial, sep="\t", index=False)
+
+
+def unmeasurable(scenario: OwnDeck, folder: Path) -> list[str]:
+    """Names of the measures that cannot be read from what a run left."""
+    _, each = _measured(scenario, folder)
+    return [name for name in scenario.measures if name not in each]
+
+
+def _measured(scenario: OwnDeck, folder: Path) -> tuple[pd.DataFrame, pd.DataFrame]:
+    """Log of a run and its measures, one row a row of the log."""
+    series = pd.read_csv(folder / "series.tsv", sep="\t")
+    return series, measured(scenario, series, folder / OUTPUT)
+
+
+def draw_measures(scenario: OwnDeck, folder: Path) -> None:
+    """Draw the measures of a run over time, one panel each."""
+    from matplotlib.figure import Figure
+
+    table = pd.read_csv(folder / LAST_MEASURED, sep="\t")
+    names = [name for name in scenario.measures if name in table]
+    rows = max(len(names), 1)
+    figure = Figure(figsize=(6, 1 + 1.8 * rows), dpi=150, layout="constrained")
+    panels = figure.subplots(rows, 1, sharex=True, squeeze=False)[:, 0]
+    for panel, name in zip(panels, names, strict=False):
+        panel.plot(table["time_s"], table[name], lw=1)
+        panel.set_ylabel(name)
+    panels[-1].set_xlabel("time, s")
+    figure.savefig(folder / PICTURE)
 
 
 def measured(scenario: OwnDeck, series: pd.DataFrame, output: Path) -> pd.DataFrame:
     """Measures by name, one row a row of the log; those that cannot be read are left out.
 
-    Parameters
-    ----------
-    scenario : OwnDeck
-    series : DataFrame
-        Time in s and the columns of the log, see ``computation.series``.
-    output : Path
-        Folder that the deck wrote its dumps into.
+    ``series``: time in s and the columns of the log, see ``computation.series``; ``output``: folder
+    that the deck wrote its dumps into.
     """
     found = {}
     time_s = series["time_s"].to_numpy() if "time_s" in series else np.full(len(series), np.nan)

@@ -68,10 +68,7 @@ def to_read(scenarios: Iterable[OwnDeck]) -> list[str]:
 
     ``scenarios``: one of each point of a study; all can be rendered.
 
-    Returns
-    -------
-    list of str
-        The first ``MOST_LINES``, and how many there are beyond.
+    Gives the first ``MOST_LINES``, and how many there are beyond.
     """
     found: dict[str, None] = {}
     seen: set[str] = set()
