@@ -159,7 +159,7 @@ def test_the_report_tells_the_change_and_what_finer_grains_should_give(tmp_path:
     other = collected.summary.assign(**{hole: 0.5 * summary[FILL]})
     pages = grain_size_pages(study, Collected(other, curves, (KEY,)), study.scenario, "50 Hz")
     assert pages is not None
-    assert "the hole as a share of what fits at 50 Hz is 0.100 smaller" in pages.short[1]
+    assert "the hole as a share of what fits at 50 Hz is 0.10 smaller" in pages.short[1]
     of_sweep = Collected(summary[:12], curves, (KEY,))
     assert grain_size_pages(study, of_sweep, study.scenario, "50 Hz") is None
 
