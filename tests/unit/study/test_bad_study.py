@@ -81,7 +81,8 @@ CASES: dict[str, tuple[str | bytes, str]] = {
     "measure without its key": (
         "based_on: tube\nobjective: {beside: [solid_fraction]}",
         "trial.yaml: objective.beside.0 = 'solid_fraction' cannot be used: "
-        "valid is a mapping of keys to values: better, measure, target, such as {measure: solid_fraction}.",
+        "valid is a mapping of keys to values: better, measure, target, such as "
+        "{measure: solid_fraction}.",
     ),
     "missing base": (
         "based_on: tuba",
