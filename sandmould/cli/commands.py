@@ -6,7 +6,6 @@ imported in its body, so that no verb waits for the imports of another.
 
 from __future__ import annotations
 
-import contextlib
 import os
 from pathlib import Path
 from typing import Annotated, Any
@@ -363,10 +362,9 @@ def report(
     """Write the report of a study again from its results."""
     from sandmould.execution.screen.ending import last_line
     from sandmould.report.page import write_report
-    from sandmould.study.plan.build_plan import RESULTS
-    from sandmould.study.plan.load_study import open_study
+    from sandmould.study.plan.build_plan import RESULTS, changed_since
     from sandmould.study.plan.ownership import check_owner
-    from sandmould.study.plan.plan_files import SPREADSHEET, SUMMARY, changed_line
+    from sandmould.study.plan.plan_files import SPREADSHEET, SUMMARY
 
     folder = RESULTS / study.stem
     check_owner(study, folder)
@@ -376,7 +374,7 @@ def report(
     if not (folder / SUMMARY).is_file():
         valid = f"a folder with {SUMMARY}, which is missing: sandmould run {study.stem} writes it"
         raise BadInputError([Problem("results", str(folder), valid)])
-    page = folder / "report.html"
+    page, said = folder / "report.html", changed_since(study, folder)
     try:
         if xlsx:
             from sandmould.report.spreadsheet import write_spreadsheet
@@ -386,9 +384,8 @@ def report(
     except (ValueError, FileNotFoundError) as error:
         valid = f"a folder of results that can be read ({error})"
         raise BadInputError([Problem("results", str(folder), valid)]) from error
-    with contextlib.suppress(BadInputError):  # a study's file may be gone, its results are here
-        if said := changed_line(open_study(study).study, study, folder):
-            typer.echo(said)
+    if said:
+        typer.echo(said)
     typer.echo(last_line(folder))
 
 

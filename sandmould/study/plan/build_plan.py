@@ -31,12 +31,18 @@ from sandmould.study.plan.load_study import (
     OpenStudy,
     StudyFile,
     at_later_key,
+    open_study,
     study_files,
     study_of,
 )
 from sandmould.study.plan.measured import problems_elsewhere
 from sandmould.study.plan.ownership import check_owner
-from sandmould.study.plan.plan_files import SCENARIO_FILE, read_run
+from sandmould.study.plan.plan_files import (
+    SCENARIO_FILE,
+    changed_line,
+    read_run,
+    write_scenarios,
+)
 from sandmould.study.plan.trust import check_letters, check_places, check_trust
 from sandmould.study.rounds.round_log import RoundLog, read_rounds
 
@@ -209,6 +215,18 @@ def open_plan(path: Path, results: Path = RESULTS, text: str | None = None) -> P
     planning = kind_named(study.study.kind).planning
     shared, fills = share_fills(runs, planning)
     return Plan(study, tuple(shared), tuple(fills), tuple(_later(runs, trial, fills, planning)))
+
+
+def changed_since(path: Path, folder: Path) -> str:
+    """Say that a study has changed since its report; empty where it has not, or is gone.
+
+    A study that was moved has moved with its files: its runs then name those that lie here.
+    """
+    with contextlib.suppress(BadInputError):
+        if said := changed_line(open_study(path).study, path, folder):
+            write_scenarios(open_plan(path).runs, folder)
+            return said
+    return ""
 
 
 def planned_runs(study: OpenStudy, log: RoundLog, folder: Path) -> list[Run]:

@@ -81,9 +81,7 @@ def write_plan(runs: Sequence[Run], folder: Path) -> None:
     ``runs``: all runs of the study, those of earlier rounds included, and the fills that they
     share; fills are no rows.
     """
-    for run in runs:
-        if (folder / run.place / SCENARIO_FILE).exists():
-            write_run(run, folder)
+    write_scenarios(runs, folder)
     table = folder / "runs.tsv"
     text = table.read_text(encoding="utf-8", errors="replace") if table.is_file() else ""
     earlier = text.splitlines()[1:]
@@ -91,6 +89,13 @@ def write_plan(runs: Sequence[Run], folder: Path) -> None:
     rows = (run for run in runs if run.part != FILL)
     ordered = sorted(rows, key=lambda run: place.get(run.run, len(place)))
     _write(table, _table_text(ordered))
+
+
+def write_scenarios(runs: Sequence[Run], folder: Path) -> None:
+    """Write ``scenario.yaml`` anew in folders of runs: where their files lie may have changed."""
+    for run in runs:
+        if (folder / run.place / SCENARIO_FILE).exists():
+            write_run(run, folder)
 
 
 def write_run(run: Run, folder: Path) -> Path:
@@ -123,7 +128,7 @@ def changed_line(study: Study, path: Path, folder: Path) -> str:
     known = folder / STUDY_FILE
     if not known.is_file() or known.read_bytes() == _study_text(study).encode():
         return ""
-    return f"{path.name} is not as it was: sandmould run makes tables and report anew"
+    return f"{path.name} was changed or moved: sandmould run makes tables and report anew"
 
 
 def _study_text(study: Study) -> str:

@@ -25,11 +25,11 @@ from sandmould.runs.hashing import scenario_hash
 from sandmould.runs.manifest import write_manifest
 from sandmould.runs.outcome import Outcome, RunOutcome
 from sandmould.study.plan.announcement import left_line
-from sandmould.study.plan.build_plan import RESULTS, Plan, open_plan
+from sandmould.study.plan.build_plan import RESULTS, Plan, changed_since, open_plan
 from sandmould.study.plan.expand import expand
 from sandmould.study.plan.lacking import Need
 from sandmould.study.plan.load_study import open_study
-from sandmould.study.plan.plan_files import changed_line, write_study
+from sandmould.study.plan.plan_files import changed_line, read_run, write_study
 from tests.planned import announce
 
 MESHES = ROOT / "config" / "meshes"
@@ -208,6 +208,24 @@ def test_runs_are_the_same_in_three_folders(
     check_whole()
 
 
+def test_a_report_of_a_moved_study_reads_the_files_that_have_moved_with_it(
+    finished: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    moved = tmp_path / "moved"
+    shutil.copytree(finished, moved)
+    monkeypatch.chdir(moved)
+    study, folder = Path("picture.yaml"), RESULTS / "picture"
+    open_plan(study)  # a look alone
+    (run,) = (p for p in folder.glob("runs/*/scenario.yaml") if "part.png" in p.read_text())
+
+    def picture() -> Path:
+        return read_run(run).scenario.shapes[0].path
+
+    assert not picture().samefile(moved / "part.png")
+    assert changed_since(study, folder).startswith("picture.yaml was changed or moved: ")
+    assert picture().samefile(moved / "part.png")
+
+
 def test_rounds_go_on_where_the_files_of_their_points_have_moved(
     finished: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
@@ -305,7 +323,7 @@ def test_a_deck_is_only_measured_again_where_another_measure_is_asked(
     assert [lack.need for lack in plan.lacks(RESULTS).values()] == 4 * [Need.MEASURE]
     assert left_line(plan, RESULTS, 1) == "All runs have ended here: 4; 4 are to be measured.\n"
     folder, study = RESULTS / "deck", plan.study.study
-    assert "deck.yaml is not as it was" in changed_line(study, plan.study.path, folder)
+    assert "deck.yaml was changed or moved" in changed_line(study, plan.study.path, folder)
     write_study(study, folder)
     assert changed_line(study, plan.study.path, folder) == ""
     # a damaged log ends no plan
