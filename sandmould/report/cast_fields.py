@@ -155,12 +155,13 @@ def _like_the_largest(parts: Sequence[CutOff]) -> int:
 
 
 def _spots(frozen: Freezing) -> Table:
-    """Hot spots."""
+    """Hot spots that froze within the run."""
     axes = [Column(f"{name}, mm") for name in "yz"[: frozen.hot_spots_m.shape[1] - 1]]
     columns = (Column("hot spot at x, mm"), *axes, Column("frozen after, s"))
     rows = tuple(
         tuple(number_cell(v, 4) for v in (*(1e3 * place), time_s))
         for place, time_s in zip(frozen.hot_spots_m, frozen.hot_spot_s, strict=True)
+        if math.isfinite(time_s)
     )
     return Table(columns, rows, (False,) * len(rows))
 

@@ -113,7 +113,12 @@ def filled_space(measure: str) -> str:
 def unit_of(key: str) -> str:
     """Unit that a key's suffix states; empty for a pure number."""
     of_list = _PLACE.sub("", key)
-    return next((unit for suffix, unit in _UNITS if of_list.endswith(suffix)), "")
+    of_section = of_list.rpartition(".")[0]  # as initial_k.casting
+    for name in (of_list, of_section if of_section.endswith("_k") else ""):
+        for suffix, unit in _UNITS:
+            if name.endswith(suffix):
+                return unit
+    return ""
 
 
 def name_of(key: str) -> str:
@@ -241,9 +246,20 @@ def value_text(key: str, value: Any) -> str:
         text = f"{shown:.6g}"
         if not math.isclose(float(text), shown, rel_tol=_ONE_NUMBER):
             text = f"{shown:.12g}"
+    elif (numbers := _numbers(value)) and unit_of(key):
+        factor, unit = _display_unit(key, max(numbers, key=abs))
+        text = f"({', '.join(f'{x / factor:.6g}' for x in numbers)})"
     else:
         text, unit = _text(value), unit_of(key)
     return f"{text} {unit}" if unit else text
+
+
+def _numbers(value: Any) -> list[float]:
+    """Numbers of a short list, as such or in JSON; none of any other value."""
+    with suppress(ValueError):
+        value = json.loads(value) if isinstance(value, str) and value[:1] == "[" else value
+    is_list = isinstance(value, list | tuple) and len(value) <= len(_AXES)
+    return list(value) if is_list and all(map(is_number, value)) else []
 
 
 def is_number(value: Any) -> TypeGuard[float]:
@@ -292,10 +308,19 @@ def _outline(text: str) -> str:
     sections = value if isinstance(value, list) else [value]
     dicts = [each for each in sections if isinstance(each, dict)]
     kinds = [str(each.get("name") or each.get("kind") or "") for each in dicts]
+    if isinstance(value, dict) and not all(kinds):
+        stated = ((name_of(key), each) for key, each in value.items() if each not in (None, [], {}))
+        return ", ".join(f"{name} {_stated(each)}".rstrip() for name, each in stated)
     if not kinds or not all(kinds):
         return f"{len(sections)} values"
     more = len(kinds) - _MOST_KINDS
     return " + ".join(kinds[:_MOST_KINDS]) + (f" + {more} more" if more > 0 else "")
+
+
+def _stated(value: Any) -> str:
+    """A value within a section; nothing of sections in it."""
+    parts = value if isinstance(value, list) else [value]
+    return " ".join(str(part) for part in parts if not isinstance(part, dict | list))
 
 
 def _section_text(section: Mapping[str, Any]) -> str:
@@ -331,7 +356,7 @@ def setting_text(values: Mapping[str, Any]) -> str:
     if len(values) == 1:
         ((key, value),) = values.items()
         text = value_text(key, value)
-        return text if unit_of(key) else f"{name_of(key)} {text}"
+        return text if unit_of(key) and is_number(value) else f"{name_of(key)} {text}"
     names = distinct_names(list(values))
     return ", ".join(f"{names[k]} {value_text(k, v)}" for k, v in values.items())
 

@@ -10,7 +10,6 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field
 from enum import StrEnum
 
-from sandmould.runs.formatting import FILL, OF_BED
 from sandmould.scenario.drive import BoxDrive
 from sandmould.statistics.config import Aim, Better, Goal
 from sandmould.statistics.over_time import Passage
@@ -234,6 +233,11 @@ class Answer:
         return half if math.isfinite(half) else 0.0
 
     @property
+    def beyond(self) -> tuple[SweepEnd, ...]:
+        """Ends of the sweep beyond which more is worth a try."""
+        return () if self.nearly_empty else self.ends
+
+    @property
     def still_changes(self) -> float:
         """Share by which the measure changed in the last quarter at the best setting, or 0."""
         return self.passage.change if self.passage else 0.0
@@ -262,15 +266,15 @@ class Answer:
         share = self.shares.get(self.best.label) if self.best else None
         if self.decided is not Decided.NONE_REACHES or share is None or self.asked.goal is None:
             return math.nan
-        gained = share.mean * abs(self.still_changes) / (1.0 + abs(self.still_changes))
+        gained = abs(share.mean * self.still_changes / (1.0 + self.still_changes))
         return abs(self.asked.goal.value - share.mean) / gained if gained else math.inf
 
     @property
     def nearly_empty(self) -> bool:
-        """Whether a space that is to be filled holds next to nothing at the best setting."""
+        """Whether a share that should be large is next to nothing at the best setting."""
         goal, best = self.asked.goal, self.best
-        is_fill = self.asked.measure.endswith((FILL, OF_BED)) and self.asked.better == "larger"
-        if goal is None or best is None or not is_fill:
+        is_share = self.asked.measure.endswith("_fraction") and self.asked.better == "larger"
+        if goal is None or best is None or not is_share:
             return False
         misses = self.decided in (Decided.NONE_REACHES, Decided.EQUAL, Decided.NO_EFFECT)
         share = self.shares.get(best.label, best).mean

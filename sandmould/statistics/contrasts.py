@@ -105,9 +105,11 @@ class Spread:
     """Whether blocks count in the differences."""
     are_unlike: bool
     """Whether settings scatter so unlike each other that they share no spread."""
+    is_exact: bool = False
+    """Whether the values do not scatter though their runs do: what differs is then told."""
 
     @staticmethod
-    def of(values: Mapping[str, pd.Series[float]]) -> Spread:
+    def of(values: Mapping[str, pd.Series[float]], is_exact: bool = False) -> Spread:
         """Fit settings and blocks to all values.
 
         Replicates that share their seeds are one block. Blocks count unless they do not link all
@@ -125,8 +127,8 @@ class Spread:
         if block.max() + 1 < len(block) and all(v.index.is_unique for v in used.values()):
             within = Contrasts(setting, block, run_value)
             if within.are_linked and 0 < apart.df <= 2 * within.df:
-                return Spread(used, within, True, unlike)
-        return Spread(used, apart, False, unlike)
+                return Spread(used, within, True, unlike, is_exact)
+        return Spread(used, apart, False, unlike, is_exact)
 
     def mean(self, label: str) -> float:
         """Mean of a setting, over all blocks alike where they count."""
@@ -152,7 +154,7 @@ class Spread:
         if not error > 1e-12 * largest:
             # all replicates differ by the same: told, unless none of them differs from another
             scatters = self.in_blocks and all(np.ptp(self.values[x]) > 0 for x in (first, second))
-            if not (scatters and abs(difference) > _ROUND_OFF * largest):
+            if not ((scatters or self.is_exact) and abs(difference) > _ROUND_OFF * largest):
                 return difference, None
             error = 1e-12 * largest
         return difference, MeanTest(difference, error, df, len(self.values))

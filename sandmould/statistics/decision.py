@@ -8,7 +8,7 @@ from dataclasses import dataclass, field, replace
 
 import pandas as pd
 
-from sandmould.runs.columns import OF_RUN, RUN
+from sandmould.runs.columns import RUN
 from sandmould.runs.formatting import OF_BED, filled_space, is_number, setting_text
 from sandmould.scenario.drive import BoxDrive
 from sandmould.statistics.answer import (
@@ -32,7 +32,7 @@ from sandmould.statistics.evidence import (
 from sandmould.statistics.main_effects import has_trend
 from sandmould.statistics.over_time import passage_of, reached_s
 from sandmould.statistics.refining import Refining, refining_of, resolution_among
-from sandmould.statistics.settings import Setting, number_blocks, setting_rows
+from sandmould.statistics.settings import Setting, measures_of, number_blocks, setting_rows
 from sandmould.statistics.verdict import Verdict, compare_settings, further_replicates
 
 _SAME = 1e-9
@@ -155,14 +155,16 @@ def _with_course(
 ) -> Answer:
     """With how a setting went on over its vibration, and where that left a pattern."""
     runs, measure = _runs(summary, answer.asked, setting), answer.asked.measure
-    means = dict[str, float]()
+    means, period_s = dict[str, float](), 0.0
     if measure in BENDING:
+        drive = evidence.drives.get(setting.label)
+        period_s = 1.0 / drive.frequency_hz if drive else 0.0
         rows = summary[summary[RUN].astype(str).isin(runs)]
         known = {name: rows[name].dropna() for name in (OUTSIDE, FARTHEST) if name in rows}
         means = {name: float(values.mean()) for name, values in known.items() if len(values)}
     return replace(
         answer,
-        passage=passage_of(evidence.curves, runs, measure),
+        passage=passage_of(evidence.curves, runs, measure, period_s),
         outside=means.get(OUTSIDE),
         farthest_m=means.get(FARTHEST),
         crushed=_largest(evidence.curves, runs, CRUSHED) if measure in BENDING else 0.0,
@@ -284,9 +286,7 @@ def _is_same(summary: pd.DataFrame, asked: Asked, used: Sequence[Setting]) -> bo
 
 def _are_same_runs(summary: pd.DataFrame, asked: Asked) -> bool:
     """Whether all that was measured is the same too."""
-    left_out = {*OF_RUN, *asked.keys}
-    measured = summary.select_dtypes("number")
-    measured = measured[[c for c in measured if c not in left_out]]
+    measured = measures_of(summary, asked.keys)
     blocks = number_blocks(summary) if asked.by_lot else [0] * len(summary)
     groups = measured.groupby(blocks)
     spans = (groups.max() - groups.min()).fillna(0.0).to_numpy()

@@ -17,6 +17,8 @@ STILL = 0.02
 """Share by which a measure may still change in the last quarter of a vibration."""
 SURE = 0.9
 """One-sided confidence that a mean change is one, where runs do not move one way (argued)."""
+_LIKE = 0.05
+"""Share of a period by which like moments may differ."""
 
 
 @dataclass(frozen=True)
@@ -50,16 +52,24 @@ class Passage:
         return self.last / self.late - 1.0 if self.late else 0.0
 
 
-def passage_of(curves: pd.DataFrame, runs: Iterable[str], measure: str) -> Passage | None:
-    """A measure of some runs over their vibration; None where no run tells."""
+def passage_of(
+    curves: pd.DataFrame, runs: Iterable[str], measure: str, period_s: float = 0.0
+) -> Passage | None:
+    """A measure of some runs over their vibration; None where no run tells.
+
+    ``period_s``: of a measure that swings with the box. Records at unlike moments of it do not
+    tell whether the measure still changes.
+    """
     runs = list(runs)
-    passages = []
+    passages, at_like_moments = [], True
     for name, run in _shaken(curves, runs, measure).groupby(RUN):
         time_s, value = (run[c].to_numpy(dtype=np.float64) for c in (VIBRATION_TIME_S, measure))
         if len(time_s) > 3 and np.isfinite(value).all():
             late = float(np.interp(0.75 * time_s[-1], time_s, value))
             own = curves[(curves[RUN] == name) & (curves[VIBRATION_TIME_S] >= 0)][measure].dropna()
             swing = _swing(own.to_numpy(dtype=np.float64))
+            late_s = time_s[time_s >= 0.7 * time_s[-1]]
+            at_like_moments &= not period_s or _are_whole((late_s - time_s[-1]) / period_s)
             passages.append((float(value[0]), late, float(value[-1]), float(time_s[-1]), swing))
     if not passages:
         return None
@@ -68,8 +78,13 @@ def passage_of(curves: pd.DataFrame, runs: Iterable[str], measure: str) -> Passa
     if moved.min() * moved.max() < 0.0:
         error = float(moved.std(ddof=1)) / math.sqrt(len(moved))
         chance = float(scipy.special.stdtrit(len(moved) - 1, SURE)) * error
+    chance = chance if at_like_moments else math.inf
     first, late, end, lasts_s, swing = np.mean(passages, axis=0).tolist()
     return Passage(first, late, end, lasts_s, swing, chance)
+
+
+def _are_whole(periods: NDArray[np.float64]) -> bool:
+    return bool((np.abs(periods - np.rint(periods)) < _LIKE).all())
 
 
 def _swing(course: NDArray[np.float64]) -> float:

@@ -7,6 +7,8 @@ import math
 from collections.abc import Sequence
 from dataclasses import dataclass
 
+import scipy
+
 RESOLUTIONS = (
     "element_m", "particle_m", "dt_max_s", "step_s", "time_step.fraction",
     "time_step.bed_fraction",
@@ -16,8 +18,6 @@ APART = 1.1
 """Ratio of two sizes from which on one is finer than the other."""
 ORDERS = (0.5, 6.0)
 """Observed orders of convergence that are regular."""
-_ALIKE = 0.05
-"""Share by which the ratios of sizes may differ."""
 
 
 @dataclass(frozen=True)
@@ -35,10 +35,17 @@ class Refining:
             return math.nan
         (h1, h2, h3), (f1, f2, f3) = self.sizes[-3:], self.values[-3:]
         first, second = f2 - f1, f3 - f2
-        if second == 0.0 or first / second <= 1.0 or abs(h1 * h3 / h2**2 - 1.0) > _ALIKE:
+        if second == 0.0:
             return math.nan
-        order = math.log(first / second) / math.log(h2 / h3)
-        return order if ORDERS[0] <= order <= ORDERS[1] else math.nan
+
+        def misfit(order: float) -> float:
+            """Of the two steps to those of an error that goes with this power of the size."""
+            return (h1**order - h2**order) / (h2**order - h3**order) - first / second
+
+        low, high = ORDERS
+        if misfit(low) * misfit(high) > 0.0:
+            return math.nan
+        return float(scipy.optimize.brentq(misfit, low, high))
 
     @property
     def value(self) -> float:

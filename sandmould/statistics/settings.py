@@ -12,7 +12,7 @@ import pandas as pd
 import scipy
 from numpy.typing import NDArray
 
-from sandmould.runs.columns import REPLICATE, SEED
+from sandmould.runs.columns import OF_RUN, REPLICATE, SEED
 from sandmould.runs.formatting import setting_text
 from sandmould.statistics.mean_tests import CONFIDENCE, MeanTest
 
@@ -99,6 +99,19 @@ def setting_rows(
     if all(pd.api.types.is_numeric_dtype(summary[k]) for k in keys):
         groups.sort(key=lambda group: tuple(group[0].values()))
     return groups
+
+
+def runs_differ(summary: pd.DataFrame, keys: Sequence[str]) -> bool:
+    """Whether anything that was measured differs between runs of one setting."""
+    measured = measures_of(summary, keys)
+    each = (measured.iloc[rows].nunique() for _, rows in setting_rows(summary, keys))
+    return any((values > 1).any() for values in each)
+
+
+def measures_of(summary: pd.DataFrame, keys: Sequence[str]) -> pd.DataFrame:
+    """Columns of numbers that were measured, and neither swept nor a run's cost."""
+    numbers = summary.select_dtypes("number")
+    return numbers[[column for column in numbers if column not in {*OF_RUN, *keys}]]
 
 
 def group_settings(

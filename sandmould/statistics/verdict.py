@@ -17,12 +17,14 @@ from sandmould.statistics.settings import (
     Setting,
     is_wide,
     number_blocks,
+    runs_differ,
     setting_of,
     setting_rows,
 )
 
 FEW = 3
 """Replicates from which on a setting's own interval tells something."""
+_ROUND_OFF = 1e-12
 
 
 @dataclass(frozen=True)
@@ -83,7 +85,10 @@ def compare_settings(
     settings = tuple(setting_of(*group) for group in groups)
     of_setting = {s.label: group[2] for s, group in zip(settings, groups, strict=True)}
     wide = is_wide(measure, settings, in_blocks)
-    ranked, comparisons, spread = _ranked(settings, of_setting, better, wide)
+    several = [s for s in settings if s.n > 1]
+    scatters = any(s.sd > _ROUND_OFF * abs(s.mean) for s in several)
+    exact = bool(several) and not scatters and runs_differ(summary, keys)
+    ranked, comparisons, spread = _ranked(settings, of_setting, better, wide, exact)
     first = comparisons[0] if comparisons else None
     resolved = first is not None and first.separated
     return Verdict(
@@ -107,6 +112,7 @@ def _ranked(
     values: Mapping[str, pd.Series[float]],
     better: Better,
     by_logarithm: bool,
+    is_exact: bool,
 ) -> tuple[list[Setting], tuple[Comparison, ...], Spread | None]:
     """Settings that have values, the best first, and the best against each of the others.
 
@@ -115,14 +121,15 @@ def _ranked(
     used = [s for s in settings if s.n]
     if not used:
         return [], (), None
-    spread = Spread.of({k: v.map(math.log) for k, v in values.items()} if by_logarithm else values)
+    taken = {k: v.map(math.log) for k, v in values.items()} if by_logarithm else values
+    spread = Spread.of(taken, is_exact)
     used.sort(key=lambda s: spread.mean(s.label), reverse=better == "larger")
     comparisons = tuple(
         Comparison.of(s.label, *spread.compare(used[0].label, s.label), by_logarithm)
         for s in used[1:]
     )
     if by_logarithm and not any(c.tested for c in comparisons):
-        return _ranked(settings, values, better, by_logarithm=False)
+        return _ranked(settings, values, better, False, is_exact)
     return used, comparisons, spread
 
 

@@ -259,6 +259,21 @@ class AnswerWords:
         return "within" if goal is None or goal.value > 0.0 else "at or below"
 
     @property
+    def goal_text(self) -> str:
+        """The value that is good enough, of a space as a share of what fits."""
+        goal = self.answer.asked.goal
+        is_share = goal is not None and goal.measure.endswith(OF_BED)
+        return f"{100 * goal.value:.3g} % of what fits" if is_share and goal else self.target
+
+    @property
+    def is_turned(self) -> bool:
+        """Whether the next setting has the better mean of all its runs, and not of like ones."""
+        best, second = self.answer.best, self.answer.verdict.runner_up
+        if best is None or second is None or best.mean == second.mean:
+            return False
+        return (best.mean < second.mean) is (self.answer.asked.better == "larger")
+
+    @property
     def more(self) -> str:
         """Further vibration that the target takes at the pace of the last quarter."""
         return self.seconds(self.answer.more_s)
@@ -286,7 +301,8 @@ class AnswerWords:
         goal = self.answer.asked.goal
         if goal is None or not goal.measure.endswith(OF_BED):
             return "" if goal is None else f" to {self.target}"
-        return "" if goal.value == FULL_SHARE else f" to {100 * goal.value:.3g} % of what fits"
+        least = f" to at least {100 * goal.value:.3g} % of what fits"
+        return "" if goal.value == FULL_SHARE else least
 
     @property
     def certainty(self) -> str:
@@ -390,7 +406,8 @@ class AnswerWords:
         best = self.answer.best
         if best is None or best.n < 2:
             return ""
-        if self.answer.decided in (Decided.NO_EFFECT, Decided.EQUAL):
+        is_exact = self.answer.verdict.spread and self.answer.verdict.spread.is_exact
+        if is_exact or self.answer.decided in (Decided.NO_EFFECT, Decided.EQUAL):
             return ""
         against = self.answer.verdict.comparisons
         same = [c.other for c in against if not c.tested and self.verdict.setting(c.other).n > 1]

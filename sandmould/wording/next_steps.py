@@ -88,7 +88,8 @@ def answer_steps(study: Study, answer: Answer) -> list[NextStep]:
     steps += [*_chance(study, answer), *_onwards(answer)]
     reaches = decided is not Decided.NONE_REACHES or steps
     unclear = answer.passage and answer.passage.is_unclear
-    spaces = [each for each in (answer, *answer.beside) if each.nearly_empty]
+    spaces = [each for each in (answer, *answer.beside)
+              if each.nearly_empty and AnswerWords(each).space]  # fmt: skip
     if AnswerWords(answer).space and not (spaces or reaches or unclear):
         spaces = [answer]
     for each in spaces:
@@ -107,7 +108,8 @@ def _onwards(answer: Answer) -> Iterable[NextStep]:
     late = next((a for a in open_ if a.longer_helps), None)
     if late is not None:
         more = AnswerWords(late).more if math.isfinite(late.more_s) else ""
-        yield step("longer", measure=name_of(late.asked.measure), more=more)
+        words = AnswerWords(late)
+        yield step("longer", measure=words.name, more=more, target=words.goal_text)
     elif answer.is_rising and decided is Decided.NONE_REACHES and not answer.nearly_empty:
         words = AnswerWords(answer)
         yield step("slow", more=words.more, space=words.space)
@@ -117,7 +119,7 @@ def _onwards(answer: Answer) -> Iterable[NextStep]:
         return
     if decided is Decided.OPEN and answer.asked.by_lot and not _is_worth(answer.further_runs):
         return
-    for end in answer.ends:
+    for end in answer.beyond:
         side = "above" if end.is_highest else "below"
         value = value_text(end.key, end.value)
         yield step("beyond", a_key=with_article(name_of(end.key)), side=side, value=value)
@@ -198,7 +200,8 @@ def optimum_steps(
             one = "above" if untried[0].is_highest else "below"
             side = one if len(untried) == 1 else "on both sides of"
             steps.append(step("outside", a_key=with_article(name_of(key)), side=side))
-    low_high = {key: optimum.interval(key) for key in study.refine.interval}
+    within = [key for key in study.refine.interval if not optimum.reached(key)]
+    low_high = {key: optimum.interval(key) for key in within}
     wide = [high - low > study.refine.interval[k] for k, (low, high) in low_high.items()]
     if any(wide) or (optimum.is_vague and not steps):
         steps.append(step("rounds", f"refine: {{rounds: {study.refine.rounds + 2}}}"))

@@ -308,7 +308,7 @@ def _note_line(told: Sequence[tuple[str, Note]], points: int) -> str:
     is_one = len({note.text for _, note in told}) == 1
     if points == 1 or (is_one and len(told) == points):
         return f"{first.about}: {first.text}"
-    alike = "" if is_one else ", with other figures at others"
-    return (
-        f"{first.about}: {first.text} (At {len(told)} of {points} points{alike}; first at {label}.)"
-    )
+    every = "both" if points == 2 else f"all {points}"
+    where = f"At {every if len(told) == points else f'{len(told)} of {points}'} points"
+    figures = f"first at {label}" if is_one else f"the figures are those of {label}"
+    return f"{first.about}: {first.text} ({where}; {figures}.)"

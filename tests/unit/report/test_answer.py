@@ -136,7 +136,7 @@ def test_the_end_of_the_sweep_is_next() -> None:
     assert "4 frequencies" in few.text
     (failed,) = failed_steps({"f100_r2": "the pattern is to move by 0.0514 m"})
     assert failed.command == "sandmould again f100_r2"
-    assert "did not finish: the pattern is to move by 0.0514 m. Once the cause" in failed.text
+    assert "did not finish: the pattern is to move by 0.0514 m. Where the cause" in failed.text
 
 
 def test_several_things_asked_make_a_table_of_what_trades() -> None:

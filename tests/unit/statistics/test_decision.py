@@ -11,6 +11,7 @@ import pytest
 from sandmould.kinds.sand.kind import SandStudy
 from sandmould.kinds.sand.narrow import Narrow
 from sandmould.runs.formatting import filled_space
+from sandmould.scenario.drive import BoxDrive
 from sandmould.statistics.answer import Asked, Decided
 from sandmould.statistics.config import Aim, Goal
 from sandmould.statistics.decision import Evidence, decide
@@ -227,6 +228,59 @@ def test_of_sizes_the_finest_answers_and_regular_ones_are_extrapolated() -> None
     assert (two.value, two.error) == (59.66, pytest.approx(1.9))
     assert math.isnan(Refining("element_m", (4.0, 2.0, 1.0), (5.0, 6.0, 5.5)).order)
     assert refining_of("time_step.fraction", [(0.8, 1.0), (0.798, 1.0)]) is None
+
+
+@pytest.mark.parametrize("sizes", [(6.0, 3.0, 2.0), (4.0, 2.0, 1.0), (5.0, 4.0, 1.0)])
+def test_regular_sizes_of_any_ratio_are_extrapolated(sizes: tuple[float, ...]) -> None:
+    found = refining_of("element_m", [(h, 268.0 + 0.15 * h**2) for h in sizes])
+    assert found is not None
+    assert found.order == pytest.approx(2.0)
+    assert found.value == pytest.approx(268.0)
+    assert found.error == pytest.approx(0.15 * sizes[-1] ** 2)
+
+
+def test_what_does_not_scatter_is_told_where_the_runs_do() -> None:
+    filled = {20: (0.3, 0.4, 0.5), 30: (0.4, 0.5, 0.6), 40: (0.5, 0.7, 0.6)}
+    shaken = {20: (1.45,) * 3, 30: (3.26,) * 3, 40: (5.8,) * 3}
+    summary = table(HZ, solid_fraction=filled, drive_acceleration_g=shaken)
+    found = answered.answered(summary, "drive_acceleration_g", [HZ], "smaller")
+    assert found.decided is Decided.BEST_AT_END
+    # where nothing differs between runs, their seeds may not reach the sand
+    alone = answered.answered(summary.drop(columns="solid_fraction"), "drive_acceleration_g", [HZ], "smaller")
+    assert alone.decided is Decided.OPEN
+
+
+def test_records_at_unlike_moments_of_a_swing_do_not_tell_whether_it_goes_on() -> None:
+    drives = {"the one setting": BoxDrive(50.0, 1e-4)}
+    for every_s, falls in ((0.02, True), (0.025, False)):
+        rows = [
+            {"run": "r0_0", "stage": "vibrate_1", "vibration_time_s": every_s * n,
+             BENT: 1e-3 * (2.0 - 0.15 * n)}
+            for n in range(9)
+        ]  # fmt: skip
+        summary = table(HZ, **{BENT: {50: (8e-4,)}}).drop(columns=HZ)
+        found = answered.answered(summary, BENT, [], "smaller", pd.DataFrame(rows), drives)
+        assert (found.still_changes < 0.0) is falls
+
+
+def test_a_falling_measure_reaches_its_target_at_the_pace_that_it_fell() -> None:
+    rows = [
+        {"run": "r0_0", "stage": "vibrate_1", "vibration_time_s": 0.05 * n,
+         "height_m": 1.8 - 0.2 * n}
+        for n in range(5)
+    ]  # fmt: skip
+    summary = table(HZ, height_m={50: (1.0,)}).drop(columns=HZ)
+    asked = Asked("height_m", "smaller", (), Goal("height_m", 0.9))
+    found = decide(asked, Evidence(summary, pd.DataFrame(rows)))
+    assert found.more_s == pytest.approx(0.025)
+
+
+def test_nothing_beyond_the_sweep_is_advised_where_next_to_nothing_was_reached() -> None:
+    filled = {20: (0.0, 0.001, 0.0), 30: (0.004, 0.005, 0.006)}
+    asked = Asked("both_fraction", "larger", (HZ,), Goal("both_fraction", 0.95))
+    found = decide(asked, Evidence(table(HZ, both_fraction=filled)))
+    assert found.ends
+    assert not found.beyond
     assert resolution_among(["exchange", "element_m"]) == "element_m"
 
 

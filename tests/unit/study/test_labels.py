@@ -81,3 +81,14 @@ def test_a_list_of_small_sections_is_read_as_it_is_said() -> None:
     assert setting_text({"fill.layers": json.dumps(layers[:1])}) == "layers 5 x 10 mm"
     assert " 27 values (" in setting_text({"fill.layers": 9 * layers})
     assert setting_text({"shapes": [{"at_m": [1, 2]}]}) == 'shapes [{"at_m": [1, 2]}]'
+
+
+def test_sections_and_places_are_told_with_what_they_state() -> None:
+    supports = {"clamped": [], "resting": ["bottom"], "hung": [{"low_m": [0.084, 0.047]}],
+                "bedding_n_m3": 3e6, "free": None}  # fmt: skip
+    told = f"supports resting bottom, hung, bedding 3000000.0 ({mark(supports)})"
+    assert setting_text({"pattern.supports": supports}) == told
+    assert setting_text({"shapes.1.high_m": "[0.075, 0.102]"}) == "upper corner (75, 102) mm"
+    assert setting_text({"initial_k.casting": 953, "initial_k.mould": 293}) == (
+        "casting 953 K, mould 293 K"
+    )

@@ -284,8 +284,8 @@ def test_a_note_of_several_points_is_told_once(tmp_path: Path) -> None:
     sweep = {"sweep": {"keys": {"heat_transfer_w_m2_k": [200, 800]}}}
     lines = plan_of(tmp_path, sweep, **around(0.04, 0.01)).splitlines()
     (note,) = [line for line in lines if line.startswith("Sand: ")]
-    assert "(At 2 of 2 points" in note
-    assert note.endswith("first at heat_transfer_w__200.)")
+    assert "(At both points" in note
+    assert note.endswith("the figures are those of heat_transfer_w__200.)")
 
 
 def test_poured_metal_without_collisions_is_told(tmp_path: Path) -> None:

@@ -63,7 +63,7 @@ def test_full_is_said_where_it_was_asked_alone(name: str) -> None:
     assert goal is not None
     lower = replace(answer, asked=replace(answer.asked, goal=replace(goal, value=0.8)))
     said = first_sentence(lower)
-    assert "the pocket to 80 % of what fits" in said
+    assert "the pocket to at least 80 % of what fits" in said
     assert "95 %" not in said
     assert "full" not in said
 
@@ -135,6 +135,16 @@ def test_a_size_that_gave_no_value_is_not_advised_again() -> None:
     of_two = answered.answered(summary, answered.FREEZES, ["element_m"], "neither", by_lot=False)
     assert of_two.refining is not None
     assert not steps(of_two)
+
+
+def test_a_best_by_like_fillings_says_that_the_next_has_the_better_mean() -> None:
+    # the first filling is a poor one, and 38 Hz has it alone
+    fills = {30: (0.5, 0.9, 0.89), 38: (0.73, math.nan, math.nan), 40: (0.70, 0.95, 0.93)}
+    summary = answered.table(answered.HZ, **{answered.FILL: fills})
+    found = answered.answered(summary, answered.FILL, [answered.HZ])
+    assert found.best is not None
+    assert found.best.label == "38 Hz"
+    assert "of like ones the first has the better mean." in detail_sentences(found)[0]
 
 
 def test_sizes_that_change_nothing_are_told_so() -> None:
