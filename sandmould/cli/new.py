@@ -58,7 +58,8 @@ def new(
         typer.Option(metavar="WIDTH DEPTH", help="Of tube and pocket."),
     ] = None,
     opens: Annotated[
-        Literal["down", "up"] | None, typer.Option(help="Side that the pocket is open to.")
+        Literal["down", "up"] | None,
+        typer.Option(help="Side that the pocket is open to; one that opens sideways is a tube."),
     ] = None,
     drawing: Annotated[
         Path | None,

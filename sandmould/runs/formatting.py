@@ -309,18 +309,20 @@ def _outline(text: str) -> str:
     dicts = [each for each in sections if isinstance(each, dict)]
     kinds = [str(each.get("name") or each.get("kind") or "") for each in dicts]
     if isinstance(value, dict) and not all(kinds):
-        stated = ((name_of(key), each) for key, each in value.items() if each not in (None, [], {}))
-        return ", ".join(f"{name} {_stated(each)}".rstrip() for name, each in stated)
+        stated = {key: each for key, each in value.items() if each not in (None, [], {})}
+        return ", ".join(
+            f"{name_of(key)} {_stated(key, each)}".rstrip() for key, each in stated.items()
+        )
     if not kinds or not all(kinds):
         return f"{len(sections)} values"
     more = len(kinds) - _MOST_KINDS
     return " + ".join(kinds[:_MOST_KINDS]) + (f" + {more} more" if more > 0 else "")
 
 
-def _stated(value: Any) -> str:
+def _stated(key: str, value: Any) -> str:
     """A value within a section; nothing of sections in it."""
     parts = value if isinstance(value, list) else [value]
-    return " ".join(str(part) for part in parts if not isinstance(part, dict | list))
+    return " ".join(value_text(key, part) for part in parts if not isinstance(part, dict | list))
 
 
 def _section_text(section: Mapping[str, Any]) -> str:

@@ -86,7 +86,7 @@ def test_a_list_of_small_sections_is_read_as_it_is_said() -> None:
 def test_sections_and_places_are_told_with_what_they_state() -> None:
     supports = {"clamped": [], "resting": ["bottom"], "hung": [{"low_m": [0.084, 0.047]}],
                 "bedding_n_m3": 3e6, "free": None}  # fmt: skip
-    told = f"supports resting bottom, hung, bedding 3000000.0 ({mark(supports)})"
+    told = f"supports resting bottom, hung, bedding 3e+06 N/m³ ({mark(supports)})"
     assert setting_text({"pattern.supports": supports}) == told
     assert setting_text({"shapes.1.high_m": "[0.075, 0.102]"}) == "upper corner (75, 102) mm"
     assert setting_text({"initial_k.casting": 953, "initial_k.mould": 293}) == (
