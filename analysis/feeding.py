@@ -101,10 +101,7 @@ def feeding(fields: Mapping[str, Any]) -> Feeding | None:
 def owner_grid(position_m: Array, size_m: Array) -> tuple[Ints, Array]:
     """Number of the element that covers each cell of the smallest size, -1 for none.
 
-    Parameters
-    ----------
-    position_m : (n, d) float64, m
-    size_m : (n,) float64, m
+    ``position_m``: (n, d) float64, m; ``size_m``: (n,) float64, m.
 
     Returns
     -------

@@ -36,11 +36,8 @@ class Limbs:
 def fit_limbs(x: ArrayLike, y: ArrayLike, se: ArrayLike) -> Limbs:
     """Fit a power law to either side of the highest point of a curve.
 
-    Parameters
-    ----------
-    x, y, se : (n,) float64
-        All positive: abscissae, values and their standard errors. Points with a value that is
-        not positive have no logarithm and are left out.
+    ``x``, ``y``, ``se``, (n,) float64: all positive: abscissae, values and their standard errors.
+    Points with a value that is not positive have no logarithm and are left out.
 
     Raises
     ------

@@ -47,12 +47,8 @@ def draw_frame(
 ) -> EllipseCollection:
     """Draw mould and metal, particles as circles coloured by pressure; for a colour bar.
 
-    Parameters
-    ----------
-    fields : mapping
-        Arrays of ``fields.npz``.
-    highest_pa : float, Pa
-        Upper end of the colours; their lower end is 0.
+    ``fields``: arrays of ``fields.npz``. ``highest_pa``: upper end of the colours; their lower end
+    is 0.
     """
     wall = fields["wall_m"]
     wall = wall[_in_slice(fields, wall)][:, [0, -1]]

@@ -59,10 +59,7 @@ class _Prism:
 def free_part(position_m: Centres, radius_m: Radii, scene: Scene) -> Array:
     """Measure of the part of each disc or sphere that lies in free space.
 
-    Returns
-    -------
-    (n,) float64, m2 in 2D or m3 in 3D
-        Never negative, even where solids overlap one another.
+    Gives (n,) float64, m2 in 2D or m3 in 3D; never negative, even where solids overlap one another.
 
     Raises
     ------
@@ -92,10 +89,8 @@ def part_in_solid(
 
     ``walls``: what of a 2D solid or an upright block lies behind them does not count.
 
-    Returns
-    -------
-    (n,) float64, m2 in 2D or m3 in 3D
-        Exact but for round solids, as the head of this file says.
+    Gives (n,) float64, m2 in 2D or m3 in 3D; exact but for round solids, as the head of this file
+    says.
     """
     if isinstance(solid, Outline):
         return disc_outline_m2(position_m, radius_m, _within(solid.vertices_m, walls))
@@ -114,9 +109,7 @@ def free_measure_between(scene: Scene, edges_m: Array) -> Array:
 
     ``edges_m``, (m + 1,) float64, m: rising heights.
 
-    Returns
-    -------
-    (m,) float64, m2 in 2D or m3 in 3D
+    Gives (m,) float64, m2 in 2D or m3 in 3D.
 
     Raises
     ------
@@ -148,10 +141,7 @@ def _meshes(scene: Scene) -> tuple[TriangleMesh, ...]:
 def box_section(scene: Scene, low_m: float = 0.0, high_m: float = 0.0) -> Array:
     """Polygon of the box: between two heights in 2D, in plan in 3D, (k, 2) float64, m.
 
-    Parameters
-    ----------
-    low_m, high_m : float, m
-        Heights that bound the polygon in 2D; not used in 3D.
+    ``low_m``, ``high_m``: heights that bound the polygon in 2D; not used in 3D.
 
     Raises
     ------
@@ -251,10 +241,7 @@ def _block_prism(block: Block, walls: tuple[Wall, ...]) -> _Prism:
 def polygon_below_m2(polygon_m: Array, height_m: Array) -> Array:
     """Area of a polygon under each height, (m,) float64, m2.
 
-    Parameters
-    ----------
-    polygon_m : (k, 2) float64, m
-    height_m : (m,) float64, m
+    ``polygon_m``: (k, 2) float64, m; ``height_m``: (m,) float64, m.
     """
     down = np.array([0.0, -1.0])
     cut = [cut_polygon(polygon_m, np.array([0.0, h]), down) for h in height_m]

@@ -116,12 +116,8 @@ def _draw_outlines(
 def draw_part(low_m: Array, high_m: Array, at_m: float, axes: Axes, distance_m: DistanceM) -> None:
     """Draw what is cast in its box before anything runs, in 3D where a plane cuts it.
 
-    Parameters
-    ----------
-    low_m, high_m : (d,) float64, m
-        Corners of the box.
-    at_m : float, m
-        In 3D, y of the plane of x and z.
+    ``low_m``, ``high_m``, (d,) float64, m: corners of the box. ``at_m``: in 3D, y of the plane of x
+    and z.
     """
     axis = 1 if len(low_m) == 3 else 2
     kept = [each for each in range(len(low_m)) if each != axis]

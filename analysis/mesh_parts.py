@@ -24,14 +24,7 @@ def sphere_mesh_m3(centre_m: Array, radius_m: Array, mesh: TriangleMesh) -> Arra
     centre inside the mesh, 0 outside, less the triangles' parts inside the sphere. So only
     triangles that the sphere meets count.
 
-    Parameters
-    ----------
-    centre_m : (n, 3) float64, m
-    radius_m : (n,) float64, m
-
-    Returns
-    -------
-    (n,) float64, m3
+    Gives (n,) float64, m3. ``centre_m``: (n, 3) float64, m; ``radius_m``: (n,) float64, m.
     """
     if len(centre_m) == 0:
         return np.zeros(0)

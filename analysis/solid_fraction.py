@@ -88,10 +88,7 @@ def bed_surface_height_m(
     ``column_width_m``, float, m: four times the largest radius unless given; stretched to a whole
     number of columns.
 
-    Returns
-    -------
-    float, m
-        NaN when there is no sand.
+    NaN when there is no sand.
 
     Raises
     ------

@@ -39,15 +39,8 @@ def transfer(
 def first_resonance_hz(frequency_hz: Array, response: Array) -> float:
     """The lowest frequency whose response is higher than its neighbours', and amplified.
 
-    Parameters
-    ----------
-    frequency_hz, response : (n,) float64
-
-    Returns
-    -------
-    float, Hz
-        Of the parabola through the highest and its neighbours, over logarithms; NaN where the bed
-        amplifies nothing between the ends.
+    Of the parabola through the highest and its neighbours, over logarithms; NaN where the bed
+    amplifies nothing between the ends. ``frequency_hz``, ``response``: (n,) float64.
     """
     x = np.log(frequency_hz)
     for i in range(1, len(x) - 1):

@@ -48,12 +48,9 @@ def tube_fill(position_m: Centres, radius_m: Radii, bore: Bore) -> TubeFill:
 
 
 def sand_in_bore(position_m: Centres, radius_m: Radii, bore: Bore) -> Array:
-    """Part of each grain inside the bore.
+    """Part of each grain inside the bore, (n,) float64, m2 in 2D or m3 in 3D.
 
-    Returns
-    -------
-    (n,) float64, m2 in 2D or m3 in 3D
-        In 3D grains cut by an edge of the bore carry an error below 1e-6 of their part.
+    In 3D grains cut by an edge of the bore carry an error below 1e-6 of their part.
     """
     depth_m, across_m = bore.local(position_m)
     local_m, to_m = np.column_stack([across_m, depth_m]), bore.length_m

@@ -18,9 +18,7 @@ def vertex_pressure_pa(perimeter: Perimeter, load_n: Array) -> Array:
     On flat parts it is the normal part of (56), positive in compression; at a corner it is that
     of a uniform pressure, where (56) has too small a value: the vertex's areas face two ways.
 
-    Parameters
-    ----------
-    load_n : (nv, d) float64, N
+    ``load_n``: (nv, d) float64, N.
     """
     area = perimeter.vertex_area_vector_m2
     return np.asarray(-np.sum(load_n * area, axis=1) / np.sum(area**2, axis=1))
@@ -34,6 +32,8 @@ def pressure_above_and_below_pa(
     Over a flange the first may be more than the weight of the sand above it, where the bed beside
     it settles and hangs on that sand; the second is what sand under it gives back.
 
+    Pa, positive in compression; NaN where nothing faces that way.
+
     Parameters
     ----------
     perimeter : Perimeter
@@ -41,11 +41,6 @@ def pressure_above_and_below_pa(
     load_n : (nv, d) float64, N
     free : (nv,) bool
         Vertices that nothing holds; sand presses on no other.
-
-    Returns
-    -------
-    (float, float)
-        Pa, positive in compression; NaN where nothing faces that way.
     """
     area = perimeter.vertex_area_vector_m2
     along = area[:, -1] / np.linalg.norm(area, axis=1)

@@ -33,10 +33,7 @@ def read_mesh(path: Path, unit_m: float = 1.0) -> Any:
     ``shapes.SIDES`` unless a group has that name. Mid-side nodes are dropped: edges are straight;
     groups of faces that have such nodes are not found.
 
-    Parameters
-    ----------
-    unit_m : float, m
-        Length of the file's unit, 0.001 for millimetres.
+    ``unit_m``: length of the file's unit, 0.001 for millimetres.
 
     Raises
     ------

@@ -94,9 +94,7 @@ class Space:
     def assembled(self, matrices: Array) -> csc_array:
         """Sum matrices of elements into one of all nodes, (n d, n d) sparse float64.
 
-        Parameters
-        ----------
-        matrices : (ne, k d, k d) float64
+        ``matrices``: (ne, k d, k d) float64.
         """
         d, n = self.dimension, self.node_m.size
         rows = (self.cells[:, :, None] * d + np.arange(d)).reshape(len(self.cells), -1)
@@ -113,12 +111,8 @@ class Space:
 def space_of(mesh: Any, order: int = 2, thickness_m: float | None = None) -> Space:
     """Set up shape functions on a mesh.
 
-    Parameters
-    ----------
-    mesh : skfem.Mesh
-        Quadrilaterals, triangles, hexahedra or tetrahedra with straight edges.
-    thickness_m : float, m
-        Out of the plane: in 2D it must be given, in 3D it must not.
+    ``mesh``: quadrilaterals, triangles, hexahedra or tetrahedra with straight edges.
+    ``thickness_m``: out of the plane: in 2D it must be given, in 3D it must not.
 
     Raises
     ------

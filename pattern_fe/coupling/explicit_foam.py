@@ -71,15 +71,10 @@ class ExplicitFoam:
     ) -> None:
         """Stand at rest as drawn.
 
-        Parameters
-        ----------
-        mass_scale : float, optional
-            Factor of all masses; just large enough for one step a step of the grains, and not
-            below 1, unless given. With a smaller one the pattern goes in shorter steps.
-        damping_ratio : float
-            Of the slowest mode, by mass damping.
-        surroundings : Surroundings, optional
-            What it can touch; nothing unless given.
+        ``mass_scale``: factor of all masses; just large enough for one step a step of the grains,
+        and not below 1, unless given. With a smaller one the pattern goes in shorter steps.
+        ``damping_ratio``: of the slowest mode, by mass damping. ``surroundings``: what it can
+        touch; nothing unless given.
 
         Raises
         ------
@@ -131,10 +126,7 @@ class ExplicitFoam:
     def advance(self, load_n: Array) -> None:
         """Go on by one step of the grains.
 
-        Parameters
-        ----------
-        load_n : (nv, d) float64, N
-            On the outer line, at the start of the step.
+        ``load_n``, (nv, d) float64, N: on the outer line, at the start of the step.
         """
         motion = self._motion
         load = self._surface.T @ load_n

@@ -30,12 +30,8 @@ class FreeBody:
     def __init__(self, pattern: Pattern, foam: InStepFoam) -> None:
         """Follow a pattern.
 
-        Parameters
-        ----------
-        pattern : Pattern
-            That nothing holds.
-        foam : InStepFoam
-            The same in motion: where it is, and what it touches.
+        ``pattern``: that nothing holds. ``foam``: the same in motion: where it is, and what it
+        touches.
         """
         self._pattern, self._foam = pattern, foam
         self._surface = pattern.surface.outer

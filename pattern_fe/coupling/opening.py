@@ -33,14 +33,8 @@ def open_coupled(
 ) -> Session:
     """Open a coupled session on a rendered deck, afresh or from a checkpoint.
 
-    Parameters
-    ----------
-    program : Program
-        Of a scenario whose pattern is among its obstacles.
-    folder : Path
-        Where the deck lies.
-    log : Path
-        The engine's log; tables of the pattern lie beside it.
+    ``program``: of a scenario whose pattern is among its obstacles. ``folder``: where the deck
+    lies. ``log``: the engine's log; tables of the pattern lie beside it.
     """
     scenario = program.scenario
     config = scenario.pattern

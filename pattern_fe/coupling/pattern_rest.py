@@ -32,12 +32,8 @@ class PatternRest:
     def see(self, displacement_m: Array, solved_m: Array) -> None:
         """Hold the stage where a surface is too far from where its loads bend it.
 
-        Parameters
-        ----------
-        displacement_m : (nv, d) float64, m
-            Of the surface, as the sand meets it.
-        solved_m : (nv, d) float64, m
-            At rest under the mean loads of the last window.
+        ``displacement_m``, (nv, d) float64, m: of the surface, as the sand meets it. ``solved_m``,
+        (nv, d) float64, m: at rest under the mean loads of the last window.
         """
         left_m, way_m = rms_m(solved_m - displacement_m), rms_m(displacement_m)
         if left_m > self.share * way_m:

@@ -19,10 +19,7 @@ def chunk_bounds(grains: int) -> Ints:
 
     Their number is even, so that two threads share them evenly.
 
-    Returns
-    -------
-    (c + 1,) int64
-        First grain of each chunk.
+    Gives (c + 1,) int64; first grain of each chunk.
     """
     chunks = max(1, 2 * round(grains / (2 * CHUNK)))
     return np.linspace(0, grains, chunks + 1).astype(np.int64)

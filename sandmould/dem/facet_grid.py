@@ -111,11 +111,7 @@ def _empty(dim: Any, arrays: SurfaceArrays, reach: float) -> FacetGrid:
 def sort_facets(dim: Any, arrays: SurfaceArrays, reach: float) -> FacetGrid:
     """Sort facets into cells.
 
-    Parameters
-    ----------
-    dim : tuple of d floats
-    reach : float, m
-        How far from a grain's centre facets are asked for.
+    ``dim``: tuple of d floats. ``reach``, m: how far from a grain's centre facets are asked for.
     """
     empty = _empty(dim, arrays, reach)
     vertices, corner = arrays.vertices, arrays.corner

@@ -28,12 +28,9 @@ def _pair_up(radius: Floats, mass: Floats, law: Law, coefficients: Floats) -> No
 
 
 def pair_up(grains: Grains, law: Law) -> Floats:
-    """What each two of k kinds make of each other.
+    """What each two of k kinds make of each other, (k, k, 3) float64.
 
-    Returns
-    -------
-    (k, k, 3) float64
-        The fields of ``PairCoefficients``.
+    The fields of ``PairCoefficients``.
     """
     kinds = len(grains.radius_of)
     coefficients = np.zeros((kinds, kinds, 3))

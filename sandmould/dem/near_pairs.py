@@ -417,12 +417,7 @@ def near_gap(skin: float, way: float) -> float:
 def watch(near: NearPairs, way: float, skin: float) -> None:
     """Say whether a look is due after all grains have moved.
 
-    Parameters
-    ----------
-    way : float, m
-        Longest way of a grain in this step.
-    skin : float, m
-        Gap of listed pairs.
+    ``way``, m: longest way of a grain in this step. ``skin``, m: gap of listed pairs.
     """
     near.left[0] -= way
     near.gap[0] = -1.0

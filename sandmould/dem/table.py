@@ -136,10 +136,8 @@ class TableSolver(Solver):
 
         ``drive``: its length is the number of steps.
 
-        Returns
-        -------
-        (steps + 2,) float64, m
-            Places of the table, from one step before the first to one step beyond the last.
+        Gives (steps + 2,) float64, m; places of the table, from one step before the first to one
+        step beyond the last.
 
         Raises
         ------

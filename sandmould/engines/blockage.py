@@ -15,12 +15,7 @@ above this sand stands there. A bed has 0.6 to 0.8, an outlet that has run empty
 def what_blocks(scenario: Scenario, snapshot: Snapshot) -> str:
     """Say what holds the sand over an outlet; empty where it flowed out or the gate was upright.
 
-    Parameters
-    ----------
-    scenario : Scenario
-        With a discharge.
-    snapshot : Snapshot
-        At rest after it.
+    ``scenario``: with a discharge. ``snapshot``: at rest after it.
     """
     gate = scenario.gate
     if gate is None or not gate.is_level:

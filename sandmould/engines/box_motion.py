@@ -10,14 +10,11 @@ from sandmould.scenario.scenario import Scenario
 
 
 def displacements(stage: Stage, first: int, count: int, step_s: float) -> Array:
-    """Displacement of the box along its direction at some steps of a stage.
+    """Displacement of the box along its direction at some steps of a stage, (count,) float64, m.
 
     ``first``: first step, counted from the stage's beginning.
 
-    Returns
-    -------
-    (count,) float64, m
-        The motion starts one step into the stage, as in the decks.
+    The motion starts one step into the stage, as in the decks.
     """
     if stage.vibration is None:
         return np.zeros(count)

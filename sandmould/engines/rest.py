@@ -35,14 +35,9 @@ class RestWatch:
     def check(self, speed_m_s: float, support_n: float, weight_n: float) -> None:
         """Take in one check, whose whole interval lies in the stage.
 
-        Parameters
-        ----------
-        speed_m_s : float
-            Root mean square speed of all grains, weighted by mass.
-        support_n : float
-            Sum of the vertical loads on all surfaces, mean over the interval, downwards.
-        weight_n : float
-            Of all grains; loads are not asked of sand without weight.
+        ``speed_m_s``: root mean square speed of all grains, weighted by mass. ``support_n``: sum of
+        the vertical loads on all surfaces, mean over the interval, downwards. ``weight_n``: of all
+        grains; loads are not asked of sand without weight.
         """
         self.speed_m_s, self.load_error = speed_m_s, math.nan
         at_rest = speed_m_s < self.speed_limit_m_s

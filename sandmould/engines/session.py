@@ -127,11 +127,8 @@ class Session(Protocol):
 
         Meant for verification: a stage must be started after it.
 
-        Parameters
-        ----------
-        position_m, velocity_m_s : (n, d) float64, m and m/s
-            In the order of ids.
-        spin_rad_s : (n, 3) float64, rad/s
+        ``position_m``, ``velocity_m_s``, (n, d) float64, m and m/s: in the order of ids.
+        ``spin_rad_s``: (n, 3) float64, rad/s.
         """
 
     def start_stage(self, stage: Stage) -> None:
@@ -157,10 +154,7 @@ class Session(Protocol):
     def surface_loads(self) -> Mapping[str, Array] | None:
         """Give the mean force of the sand on each wall and block over the last check.
 
-        Returns
-        -------
-        mapping of surface to (d,) float64, N, or None
-            None when the last advance did not end a check.
+        (d,) float64, N, by surface; None when the last advance did not end a check.
         """
 
     def table_periods(self) -> list[TablePeriod]:
@@ -171,11 +165,8 @@ class Session(Protocol):
 
         Dashpots are corrected for the limit itself; once the bed has given the step, for that.
 
-        Returns
-        -------
-        float, s
-            Limit of the whole system with its dashpots, eq. (42); infinite where nothing touches.
-            All contacts count as sticking, and none opens: the stiffest case.
+        Limit of the whole system with its dashpots, eq. (42); infinite where nothing touches. All
+        contacts count as sticking, and none opens: the stiffest case.
         """
 
     def write_checkpoint(self, folder: Path) -> None:
@@ -217,10 +208,7 @@ class SandSession(Session, Protocol):
 
         ``name``: a surface made of facets.
 
-        Returns
-        -------
-        (nv, d) float64, N, or None
-            None when no load was sampled since.
+        (nv, d) float64, N; None when no load was sampled since.
 
         Raises
         ------

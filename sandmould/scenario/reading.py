@@ -131,14 +131,8 @@ def _starts_anew(value: Tree, below: Tree) -> bool:
 def merge(base: Tree, extra: Tree, origin: Origin, file: str, above: str = "") -> Tree:
     """Lay one tree over another: mappings merge, lists, values and what excludes replace.
 
-    Parameters
-    ----------
-    base, extra : dict
-        A leaf may be written ``{value: ..., unit: ..., source: ...}``.
-    origin : Origin
-        Updated with the file and source of every leaf of ``extra``.
-    above : str
-        Key path of ``base``.
+    ``base``, ``extra``: a leaf may be written ``{value: ..., unit: ..., source: ...}``. ``origin``:
+    updated with the file and source of every leaf of ``extra``. ``above``: key path of ``base``.
     """
     merged = dict(base)
     for name, value in extra.items():

@@ -69,13 +69,8 @@ def no_cost(scenario: Solidification) -> ElementCost:
 def compute(scenario: Solidification, folder: Path, run: str) -> Computed:
     """Solidify a casting from its newest checkpoint, or from its beginning.
 
-    Parameters
-    ----------
-    scenario : Solidification
-    folder : Path
-        The run's; products are written to its ``work``.
-    run : str
-        Its name, for the line of progress.
+    ``folder``: the run's; products are written to its ``work``. ``run``: its name, for the line of
+    progress.
     """
     work = folder / "work"
     work.mkdir(parents=True, exist_ok=True)

@@ -49,11 +49,7 @@ class _Faces:
 def with_cut(raster: Raster, solids: Sequence[Body]) -> Raster:
     """Give a painted raster the drawing's volumes and areas.
 
-    Parameters
-    ----------
-    raster : Raster
-        Painted with the same solids. They may touch: there is no surface between them.
-    solids : sequence of Body
+    ``raster``: painted with the same solids. They may touch: there is no surface between them.
     """
     casting = raster.material == CASTING
     faces = _faces(casting)

@@ -31,13 +31,7 @@ LEAST = 1e-3
 def passage_of(raster: Raster, solids: Sequence[Body], held: Held) -> BesideFaces:
     """Faces that a surface cuts within a material, and links past it.
 
-    Parameters
-    ----------
-    raster : Raster
-        Painted with the solids.
-    solids : sequence of Body
-    held : Held
-        What its cells hold.
+    ``raster``: painted with the solids. ``held``: what its cells hold.
     """
     casting = raster.material.reshape(-1) == CASTING
     low, high, axis = _cut_faces(raster, held)

@@ -41,17 +41,8 @@ class Held:
 def held_of(raster: Raster, solids: Sequence[Body]) -> Held:
     """Of each cell that which lies in the casting, and where.
 
-    Parameters
-    ----------
-    raster : Raster
-        Painted with the solids.
-    solids : sequence of Body
-
-    Returns
-    -------
-    Held
-        Counted at points in each cell beside one of the other material; shares of 0 or 1 and no
-        lever in all others.
+    Counted at points in each cell beside one of the other material; shares of 0 or 1 and no lever
+    in all others. ``raster``: painted with the solids.
     """
     casting = raster.material == CASTING
     near = maximum_filter(casting, 3, mode="nearest") & ~minimum_filter(casting, 3, mode="nearest")
@@ -96,23 +87,19 @@ def inside_any(solids: Sequence[Body], place_m: Floats) -> Flags:
 
 
 def volumes(casting: Flags, held: Held, between: tuple[Ints, Ints], area: Floats) -> Floats:
-    """What each cell counts for over its own volume.
+    """What each cell counts for over its own volume, (n,) float64.
+
+    The sum over each material is the drawing's, and so is that of volume times place, but where a
+    wall is too thin to share with a next cell or a cell has least to give.
 
     Parameters
     ----------
     casting : (nx, ny) or (nx, ny, nz) bool
         Whether a cell is of the casting.
-    held : Held
     between : two of (f,) int64
         Cells on the low and on the high side of the faces between unlike materials.
     area : (f,) float64
         Of the drawn surface at each of them.
-
-    Returns
-    -------
-    (n,) float64
-        The sum over each material is the drawing's, and so is that of volume times place, but
-        where a wall is too thin to share with a next cell or a cell has least to give.
     """
     own = np.where(casting.reshape(-1), held.share, 1.0 - held.share)
     # never so much that less than the least is left

@@ -160,17 +160,8 @@ def least_sand_share(scenario: Solidification, it: Cooled) -> float:
 def freezes_s(scenario: Solidification, it: Cooled, depth_m: float = math.inf) -> float:
     """When the thickest place of a casting is solid.
 
-    Parameters
-    ----------
-    scenario : Solidification
-    it : Cooled
-    depth_m : float, m
-        Sand before the box ends; unbounded unless given.
-
-    Returns
-    -------
-    float, s
-        Infinite where that sand cannot take the heat.
+    Infinite where that sand cannot take the heat. ``depth_m``: sand before the box ends; unbounded
+    unless given.
     """
     need_j_m2 = heat_to_lose_j_m3(scenario) * it.modulus_m
     if not math.isfinite(need_j_m2) or need_j_m2 >= sand_takes_j_m3(scenario) * depth_m:

@@ -34,10 +34,8 @@ class Exchange:
         Half the row sum of Gershgorin's circle; where all rates are positive, temperatures then
         stay between those of the neighbours before the step.
 
-        Parameters
-        ----------
-        capacity_j_m3_k : (n,) float64, J/m3/K
-            Without latent heat, which only slows an element down.
+        ``capacity_j_m3_k``, (n,) float64, J/m3/K: without latent heat, which only slows an element
+        down.
         """
         size = np.add.reduceat(np.abs(self._padded()), self.start[:-1])
         total = np.add.reduceat(self._padded(), self.start[:-1])
@@ -75,10 +73,8 @@ def from_rows(row: Ints, column: Ints, rate_w_m3_k: Floats, volume_m3: Floats) -
 def resistances(resistance_m2k_w: float | Floats, count: int) -> Floats:
     """Resistance between each two of some materials, (count, count) float64, m2 K/W.
 
-    Parameters
-    ----------
-    resistance_m2k_w : float or (count, count) float64, m2 K/W
-        A number acts where the casting meets another material: two moulds lie in one another.
+    ``resistance_m2k_w``, float or (count, count) float64, m2 K/W: a number acts where the casting
+    meets another material: two moulds lie in one another.
 
     Raises
     ------

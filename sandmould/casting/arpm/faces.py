@@ -44,9 +44,7 @@ class Faces:
 def owners(elements: Elements) -> Ints:
     """Number of the element that covers each cell of the finest size.
 
-    Returns
-    -------
-    (nx, ny) or (nx, ny, nz) int64
+    Gives (nx, ny) or (nx, ny, nz) int64.
 
     Raises
     ------

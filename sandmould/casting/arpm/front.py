@@ -23,19 +23,11 @@ REACH = 1.6
 
 
 def middle_frozen_s(elements: Elements, filling: Filling, frozen_s: Floats) -> Floats:
-    """Interpolate freezing times to the elements' middles.
+    """Interpolate freezing times to the elements' middles, (n,) float64, s.
 
-    Parameters
-    ----------
-    elements : Elements
-    filling : Filling
-    frozen_s : (n,) float64, s
-        When each element's mean enthalpy fell below its solidus; NaN before.
-
-    Returns
-    -------
-    (n,) float64, s
-        The same for alloys, and for an element that freezes later than all those round it.
+    The same for alloys, and for an element that freezes later than all those round it.
+    ``frozen_s``, (n,) float64, s: when each element's mean enthalpy fell below its solidus; NaN
+    before.
     """
     at_once = np.array([it.melts and it.solidus_k == it.liquidus_k for it in filling.materials])
     frozen = np.flatnonzero(np.isfinite(frozen_s) & at_once[elements.material])
@@ -50,16 +42,7 @@ def middle_frozen_s(elements: Elements, filling: Filling, frozen_s: Floats) -> F
 def gradient_k_m(elements: Elements, noted: Floats) -> Floats:
     """Temperature gradient at each element when it passes where gradients are read.
 
-    Parameters
-    ----------
-    elements : Elements
-    noted : (3, n) float64
-        As of ``Heat``.
-
-    Returns
-    -------
-    (n,) float64, K/m
-        NaN where nothing was read.
+    Gives (n,) float64, K/m; NaN where nothing was read. ``noted``, (3, n) float64: as of ``Heat``.
     """
     _, read_s, cooling_k_s = noted
     there = np.flatnonzero(np.isfinite(read_s))

@@ -58,15 +58,8 @@ class LocalSteps:
     ) -> None:
         """Sort the elements by their steps.
 
-        Parameters
-        ----------
-        exchange : Exchange
-        substance : Substance
-        share : float
-            Of each element's longest stable step.
-        most_levels : int
-            Elements never step more than 2 to this power less one times as long as others.
-        threads : int
+        ``share``: of each element's longest stable step. ``most_levels``: elements never step more
+        than 2 to this power less one times as long as others.
         """
         limit_s = share * exchange.limit_s(substance.capacity_j_m3_k)
         self._shortest_s = float(limit_s.min())

@@ -119,14 +119,8 @@ class ExplicitSteps:
     ) -> None:
         """Choose the step.
 
-        Parameters
-        ----------
-        exchange : Exchange
-        substance : Substance
-        share : float
-            Of the longest step that keeps temperatures between those of the neighbours.
-        threads : int
-            Results do not depend on it.
+        ``share``: of the longest step that keeps temperatures between those of the neighbours.
+        ``threads``: results do not depend on it.
         """
         self.volume_m3 = exchange.volume_m3
         self.step_s = share * float(exchange.limit_s(substance.capacity_j_m3_k).min())

@@ -61,12 +61,7 @@ class HeatMethod:
     def marching(self, elements: Elements, filling: Filling, raster: Raster) -> Marching:
         """Make ready to go forward in time.
 
-        Parameters
-        ----------
-        elements : Elements
-            Placed on the raster; of one size for finite differences.
-        filling : Filling
-        raster : Raster
+        ``elements``: placed on the raster; of one size for finite differences.
 
         Raises
         ------

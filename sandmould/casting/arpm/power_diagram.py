@@ -26,17 +26,14 @@ def power_exchange(
 ) -> Exchange:
     """Rates over the faces of a power diagram with weights (r0/2)^2.
 
+    Its volumes are those of the diagram's cells, not of squares.
+
     Parameters
     ----------
     elements : Elements
         Of 2D, at any positions in their box; its walls are insulated.
     conductivity_w_m_k : (m,) float64, W/m/K
     resistance_m2k_w : float or (m, m) float64, m2 K/W
-
-    Returns
-    -------
-    Exchange
-        Its volumes are those of the diagram's cells, not of squares.
 
     Raises
     ------

@@ -21,14 +21,7 @@ def probe_weights(elements: Elements, probes_m: Mapping[str, Floats]) -> csr_arr
     Moving least squares over elements of the material that the point is in (Lancaster and
     Salkauskas, Mathematics of Computation 37 (1981) 141-158).
 
-    Parameters
-    ----------
-    elements : Elements
-    probes_m : mapping of name to (d,) float64, m
-
-    Returns
-    -------
-    (len(probes_m), n) sparse float64
+    Gives (len(probes_m), n) sparse float64. ``probes_m``: mapping of name to (d,) float64, m.
 
     Raises
     ------

@@ -104,8 +104,6 @@ def solidify(
 
     Parameters
     ----------
-    elements : Elements
-    filling : Filling
     marching : Marching
         Made of the same elements.
     probes_m : mapping of name to (d,) float64, m, optional

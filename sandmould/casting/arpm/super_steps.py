@@ -29,17 +29,10 @@ STAGES = 9
 
 
 def stage_weights(stages: int) -> Floats:
-    """Coefficients of the stages.
+    """Coefficients of the stages, (stages, 4) float64.
 
-    Parameters
-    ----------
-    stages : int
-        At least 3.
-
-    Returns
-    -------
-    (stages, 4) float64
-        For stage j = 1 ...: mu, nu, mu~, gamma~ of Meyer et al., eqs. (16) and (17).
+    For stage j = 1 ...: mu, nu, mu~, gamma~ of Meyer et al., eqs. (16) and (17). ``stages``: at
+    least 3.
 
     Raises
     ------
@@ -74,15 +67,8 @@ class SuperSteps:
     ) -> None:
         """Choose the step.
 
-        Parameters
-        ----------
-        exchange : Exchange
-        substance : Substance
-        stages : int
-            At most; shorter durations take fewer.
-        share : float
-            Of (s^2 + s - 2)/4 stable explicit steps.
-        threads : int
+        ``stages``: at most; shorter durations take fewer. ``share``: of (s^2 + s - 2)/4 stable
+        explicit steps.
         """
         self.volume_m3 = exchange.volume_m3
         self._explicit_s = share * float(exchange.limit_s(substance.capacity_j_m3_k).min())

@@ -20,14 +20,15 @@ from sandmould.compiled import njit
 def collisions(
     near: Neighbours, velocity: Floats, kind: Kinds, distance_m: float, restitution: float
 ) -> Floats:
-    """Change of velocity in the collisions of one instant.
+    """Change of velocity in the collisions of one instant, (n, 3) float64, m/s.
 
     All of a particle's collisions start from the same velocities; those of two particles of fluid
     cancel, so that momentum is kept.
 
+    0 on walls and dummies.
+
     Parameters
     ----------
-    near : Neighbours
     velocity : (n, 3) float64, m/s
     kind : (n,) int8
         The mould does not give way.
@@ -35,11 +36,6 @@ def collisions(
         Nearer than which particles collide.
     restitution : float
         Speed of parting over that of approach.
-
-    Returns
-    -------
-    (n, 3) float64, m/s
-        0 on walls and dummies.
     """
     change = np.zeros_like(velocity)
     for i in range(len(kind)):

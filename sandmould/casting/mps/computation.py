@@ -69,13 +69,8 @@ def compute(scenario: MetalFlow, folder: Path, run: str) -> Computed:
     A tank is run to see whether its setting holds: a guard that stops it is the answer, and the
     run has finished. Pouring that a guard stops has failed.
 
-    Parameters
-    ----------
-    scenario : MetalFlow
-    folder : Path
-        The run's; products are written to its ``work``.
-    run : str
-        Its name, for the line of progress.
+    ``folder``: the run's; products are written to its ``work``. ``run``: its name, for the line of
+    progress.
     """
     work = folder / "work"
     work.mkdir(parents=True, exist_ok=True)

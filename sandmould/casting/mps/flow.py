@@ -192,13 +192,8 @@ class Flow:
     ) -> None:
         """Step until a time.
 
-        Parameters
-        ----------
-        until_s : float, s
-        each : function of the flow
-            Called after every step.
-        progress : function of a ``FlowProgress``
-            Called after every step.
+        ``each``, function of the flow: called after every step. ``progress``, function of a
+        ``FlowProgress``: called after every step.
         """
         begin_s, wall_s, done = self.time_s, self.cost.wall_s, self.cost.particle_solves
         while self.time_s < until_s * (1.0 - 1e-12):

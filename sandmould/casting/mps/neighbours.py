@@ -78,12 +78,7 @@ def _both_ways(n: int, pair: Ints, kind: Kinds) -> tuple[Ints, NDArray[np.uint32
 def find_candidates(kernel: Kernel, position_m: Floats, kind: Kinds) -> VerletList:
     """List candidates.
 
-    Parameters
-    ----------
-    kernel : Kernel
-    position_m : (n, 3) float64, m
-        Finite.
-    kind : (n,) int8
+    ``position_m``, (n, 3) float64, m: finite. ``kind``: (n,) int8.
     """
     period = np.asarray(kernel.period_m)
     cyclic = period > 0.0
@@ -125,7 +120,6 @@ def find_neighbours(
 
     Parameters
     ----------
-    kernel : Kernel
     listed : VerletList
         Not old.
     position : (n, 3) float64, m

@@ -54,15 +54,7 @@ def density_rate(kernel: Kernel, near: Neighbours, velocity: Floats) -> Floats:
 
     The source of higher order, HS (Khayyer and Gotoh 2009).
 
-    Parameters
-    ----------
-    kernel : Kernel
-    near : Neighbours
-    velocity : (n, 3) float64, m/s
-
-    Returns
-    -------
-    (n,) float64, 1/s
+    Gives (n,) float64, 1/s. ``velocity``: (n, 3) float64, m/s.
     """
     rate = np.zeros(len(velocity))
     for i in range(len(velocity)):
@@ -88,18 +80,8 @@ def divergence(kernel: Kernel, near: Neighbours, velocity: Floats) -> Floats:
 def laplacian(kernel: Kernel, near: Neighbours, field: Floats, kind: Kinds) -> Floats:
     """Laplacian of a vector field at the fluid's particles, eq. (4) with its sign turned.
 
-    Parameters
-    ----------
-    kernel : Kernel
-    near : Neighbours
-    field : (n, 3) float64
-        Also on walls and dummies.
-    kind : (n,) int8
-
-    Returns
-    -------
-    (n, 3) float64, the field's unit over m2
-        0 on walls and dummies.
+    Gives (n, 3) float64, the field's unit over m2; 0 on walls and dummies. ``field``,
+    (n, 3) float64: also on walls and dummies. ``kind``: (n,) int8.
     """
     result = np.zeros_like(field)
     factor = 2.0 * kernel.dimension / kernel.lattice_density
@@ -180,22 +162,17 @@ def _corrected(kernel: Kernel, near: Neighbours, kind: Kinds, gradient: Floats) 
 def pressure_gradient(
     kernel: Kernel, near: Neighbours, pressure: Floats, kind: Kinds, form: str
 ) -> Floats:
-    """Gradient of the pressure at the fluid's particles, eq. (3).
+    """Gradient of the pressure at the fluid's particles, eq. (3), (n, 3) float64, Pa/m.
+
+    0 on walls and dummies.
 
     Parameters
     ----------
-    kernel : Kernel
-    near : Neighbours
     pressure : (n,) float64, Pa
         Of fluid and walls; dummies have none.
     kind : (n,) int8
     form : str
         One of ``GRADIENTS``.
-
-    Returns
-    -------
-    (n, 3) float64, Pa/m
-        0 on walls and dummies.
     """
     gradient = _gradient(kernel, near, pressure, kind, GRADIENTS[form])
     if form != "corrected":
@@ -226,17 +203,8 @@ def velocity_gradient(kernel: Kernel, near: Neighbours, velocity: Floats, kind: 
 
     As the corrected gradient of the pressure; dummies are left out.
 
-    Parameters
-    ----------
-    kernel : Kernel
-    near : Neighbours
-    velocity : (n, 3) float64, m/s
-    kind : (n,) int8
-
-    Returns
-    -------
-    (n, 3, 3) float64, 1/s
-        At [i, a, b]; 0 on dummies.
+    Gives (n, 3, 3) float64, 1/s; at [i, a, b]; 0 on dummies. ``velocity``: (n, 3) float64, m/s;
+    ``kind``: (n,) int8.
     """
     return _corrected(kernel, near, kind, _velocity_differences(kernel, near, velocity, kind))
 
@@ -245,16 +213,8 @@ def velocity_gradient(kernel: Kernel, near: Neighbours, velocity: Floats, kind: 
 def crowding(kernel: Kernel, near: Neighbours, kind: Kinds) -> Floats:
     """Gradient of the concentration of particles, d/n0 sum of r_ij w / r^2; 0 on a lattice.
 
-    Parameters
-    ----------
-    kernel : Kernel
-    near : Neighbours
-    kind : (n,) int8
-
-    Returns
-    -------
-    (n, 3) float64, 1/m
-        0 on walls and dummies, which count as neighbours.
+    Gives (n, 3) float64, 1/m; 0 on walls and dummies, which count as neighbours. ``kind``:
+    (n,) int8.
     """
     result = np.zeros((len(kind), 3))
     factor = kernel.dimension / kernel.lattice_density

@@ -94,7 +94,6 @@ def solve(
 
     Parameters
     ----------
-    system : System
     right : (m,) float64
     guess : (m,) float64
         Where the iteration starts, unless 0 leaves a smaller residual.

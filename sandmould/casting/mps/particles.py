@@ -54,17 +54,9 @@ def at_rest(position_m: Floats, kind: Kinds | int) -> Particles:
 
 
 def lattice(low: tuple[int, ...], high: tuple[int, ...], spacing_m: float) -> Floats:
-    """Points of a lattice, half a spacing off the origin.
+    """Points of a lattice, half a spacing off the origin, (n, d) float64, m.
 
-    Parameters
-    ----------
-    low, high : tuple of d ints
-        Sites run from low to high, high left out.
-    spacing_m : float, m
-
-    Returns
-    -------
-    (n, d) float64, m
+    ``low``, ``high``, tuple of d ints: sites run from low to high, high left out.
     """
     axes = [np.arange(a, b) + 0.5 for a, b in zip(low, high, strict=True)]
     return spacing_m * np.stack(np.meshgrid(*axes, indexing="ij"), -1).reshape(-1, len(low))
@@ -75,18 +67,10 @@ def mould_around(
 ) -> Particles:
     """Mould particles behind the surface of a cavity.
 
-    Parameters
-    ----------
-    site_m : (n, d) float64, m
-        Lattice of candidates; it must reach the mould's layers beyond the cavity.
-    is_cavity : function of (n, d) float64, m, to (n,) bool
-    spacing_m : float, m
-
-    Returns
-    -------
-    Particles
-        Sites outside the cavity within the mould's layers of it (in the largest component of
-        their distance); those touching it, diagonals included, are walls, the rest dummies.
+    Sites outside the cavity within the mould's layers of it (in the largest component of their
+    distance); those touching it, diagonals included, are walls, the rest dummies. ``site_m``,
+    (n, d) float64, m: lattice of candidates; it must reach the mould's layers beyond the cavity.
+    ``is_cavity``: function of (n, d) float64, m, to (n,) bool.
     """
     inside = is_cavity(site_m)
     outer = site_m[~inside]

@@ -48,14 +48,8 @@ class Rows(NamedTuple):
 def assemble(kernel: Kernel, near: Neighbours, kind: Kinds, surface: Flags) -> Rows:
     """Build the system by eq. (4) over n0, so that it is symmetric.
 
-    Parameters
-    ----------
-    kernel : Kernel
-    near : Neighbours
-    kind : (n,) int8
-        Dummies have no pressure: no flux of it into the mould.
-    surface : (n,) bool
-        Where the pressure is zero.
+    ``kind``, (n,) int8: dummies have no pressure: no flux of it into the mould. ``surface``,
+    (n,) bool: where the pressure is zero.
     """
     n = len(kind)
     factor = 2.0 * kernel.dimension / kernel.lattice_density

@@ -84,15 +84,8 @@ def open_shoulder(
 ) -> Flow:
     """Flow in the mould, full of metal at rest or with a first layer to be poured on.
 
-    Parameters
-    ----------
-    size_m : float, m
-        Of the particles; the paper does not give it (2 mm make about 19 700 in the casting).
-    scheme : Scheme
-    full : bool
-    metal : LiquidMetal, optional
-        The paper's unless given; its gravity is along -z.
-    casting : Casting
+    ``size_m``: of the particles; the paper does not give it (2 mm make about 19 700 in the
+    casting). ``metal``: the paper's unless given; its gravity is along -z.
 
     Raises
     ------

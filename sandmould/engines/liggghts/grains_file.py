@@ -16,10 +16,7 @@ _HEADER = struct.Struct("=qq7i6dii")
 def read_grains(path: Path) -> Array:
     """Read a binary dump of one instant, written by one process.
 
-    Returns
-    -------
-    (n, columns) float64
-        Sorted by the first column, the ids.
+    Gives (n, columns) float64; sorted by the first column, the ids.
 
     Raises
     ------
