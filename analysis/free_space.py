@@ -249,11 +249,9 @@ def polygon_below_m2(polygon_m: Array, height_m: Array) -> Array:
 
 
 def _cuboid_below_m3(size_m: Array, slope: Array, height_m: Array) -> Array:
-    """Volume of a tilted cuboid under heights measured from its centre.
-
-    The height of a point drawn at random in the cuboid is a sum of uniform numbers, one an axis;
-    its distribution is the inclusion-exclusion sum over the corners of powers of (h - corner).
-    """
+    """Volume of a tilted cuboid under heights measured from its centre."""
+    # The height of a random point in it is a sum of uniform numbers, one an axis:
+    # inclusion-exclusion over the corners of powers of (h - corner).
     rise_m = size_m * np.abs(slope)
     # a side all but level adds nothing to the spread and would only cancel digits
     rise_m = rise_m[rise_m > 1e-5 * rise_m.max()]

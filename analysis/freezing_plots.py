@@ -142,11 +142,8 @@ def _section(
 
 
 def _cut(fields: Mapping[str, Array], freezing: Freezing) -> tuple[dict[str, Array], int, float]:
-    """Elements of 3D that a plane through the last point to freeze cuts; all of 2D.
-
-    Of the three planes the one with most of the casting; given with its normal's number and where
-    it lies, in m.
-    """
+    """Elements of 3D that a plane through the last point to freeze cuts; all of 2D."""
+    # Of the three planes that with most of the casting; its normal's number, its place in m.
     position_m, half_m = fields["position_m"], 0.5 * fields["size_m"]
     if position_m.shape[1] == 2:
         return dict(fields), 2, np.nan

@@ -167,10 +167,8 @@ def _usual_fraction(local: Array, clear_m: Array, ball_m: float, cell_m: float) 
 
 
 def _sides(from_solid_m: Array, near_m: float) -> NDArray[np.int8]:
-    """On which side of the solids each place lies, as a number into ``SIDES``.
-
-    A place between two solids, one over the other, counts as under the upper one.
-    """
+    """On which side of the solids each place lies, as a number into ``SIDES``."""
+    # A place between two solids, one over the other, counts as under the upper one.
     inside = from_solid_m <= 0.0
     up = np.logical_or.accumulate(inside[..., ::-1], axis=-1)[..., ::-1]
     down = np.logical_or.accumulate(inside, axis=-1)
@@ -189,10 +187,8 @@ def _zones(
     grain_m: float,
     scene: Scene,
 ) -> tuple[tuple[LooseZone, ...], NDArray[np.int32]]:
-    """Zones at least as large as a grain, the largest first, and each place's number of its zone.
-
-    ``local`` is 0 where no place is.
-    """
+    """Zones at least as large as a grain, the largest first, and the zone of each place."""
+    # local is 0 where no place is
     dimension, cell_m = grid.shape[-1], grain_m / CELLS_A_GRAIN
     number, _ = label(loose)
     cell = cell_m**dimension

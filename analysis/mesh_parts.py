@@ -48,12 +48,10 @@ def sphere_mesh_m3(centre_m: Array, radius_m: Array, mesh: TriangleMesh) -> Arra
 
 
 def _triangle_part_m3(corners_m: Array, radius_m: Array) -> Array:
-    """What the part of a triangle inside a sphere round the origin adds, (p,) float64, m3.
-
-    Integrated in the triangle's plane, in polar coordinates round the foot of the centre: over a
-    swept angle out to a radius rho, area and solid angle are rho^2/2 and 1 - h/sqrt(h^2 + rho^2).
-    An edge at the distance d from the foot has rho = d/cos(angle), cut off at the sphere's rim.
-    """
+    """What the part of a triangle inside a sphere round the origin adds, (p,) float64, m3."""
+    # In polar coordinates round the foot of the centre, over an angle out to rho, area and solid
+    # angle are rho^2/2 and 1 - h/sqrt(h^2 + rho^2); an edge d from the foot has rho = d/cos(angle),
+    # cut off at the sphere's rim.
     edge_m = np.roll(corners_m, -1, axis=1) - corners_m
     normal = np.cross(edge_m[:, 0], edge_m[:, 1])
     normal /= np.linalg.norm(normal, axis=1)[:, None]

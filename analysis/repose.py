@@ -179,10 +179,7 @@ def fit_flank(name: str, distance_m: Array, height_m: Array, foot: float = FOOT)
 
 
 def _slope_error(x: Array, residual: Array) -> float:
-    """Standard error of a slope whose residuals are correlated from point to point.
-
-    A first-order autoregression with coefficient c has n (1 - c) / (1 + c) free points among n.
-    """
+    """Standard error of a slope; residuals of correlation c leave n (1 - c)/(1 + c) free points."""
     n = len(x)
     residual = residual - residual.mean()
     variance = float((residual**2).sum())

@@ -80,11 +80,8 @@ def place(point_m: Iterable[float]) -> str:
 
 
 def _inverted(mesh: Any) -> NDArray[np.bool_]:
-    """Elements folded in themselves or over their neighbours, (ne,) bool.
-
-    The order of an element's corners may run either way, in a file as in scikit-fem; so those
-    that are turned inside out are known by lying on the same side of a shared face as others.
-    """
+    """Elements folded in themselves or over their neighbours, (ne,) bool."""
+    # Corners may run either way: elements inside out lie on one side of a shared face.
     # not the mesh's own mapping, which inverts that of simplices at once
     mapping, axes = MappingIsoparametric(mesh, mesh.elem()), range(mesh.dim())
     edges = np.array([[mapping.J(i, j, mesh.refdom.p) for j in axes] for i in axes])

@@ -103,11 +103,8 @@ def _parsed(path: Path) -> meshio.Mesh:
 
 @contextlib.contextmanager
 def _all_saved() -> Iterator[None]:
-    """Let meshio read files of Gmsh 4.1 whose groups do not hold all elements (Mesh.SaveAll).
-
-    It gives the numbers of groups for the elements in groups alone, and then refuses them as too
-    few. Groups are found by their names, so that the numbers can go.
-    """
+    """Let meshio read files of Gmsh 4.1 whose groups do not hold all elements (Mesh.SaveAll)."""
+    # It takes the numbers of groups for too few then. Groups are found by their names.
     given = _gmsh41.Mesh
 
     def fitting(points: Any, cells: Any, *, cell_data: dict[str, Any], **others: Any) -> Any:

@@ -140,10 +140,7 @@ def perimeter_of(space: Space) -> Perimeter:
 
 
 def _motion(space: Space) -> csr_array:
-    """Shares of nodes in the motion of places between which facets may lie, (places, n) float64.
-
-    Nodes come first, in their order; in hexahedra of first order middles of all faces follow.
-    """
+    """Shares of nodes in the motion of places of facets, (places, n) float64: nodes, then faces."""
     mesh, n, corners = space.mesh, len(space.node_m), space.mesh.nvertices
     between = [] if space.order == 1 else [mesh.edges.T if mesh.dim() == 3 else mesh.facets.T]
     if len(mesh.facets) == 4:
@@ -161,16 +158,8 @@ def _motion(space: Space) -> csr_array:
 
 
 def _split(faces: Indices, middle: Indices | None) -> tuple[Indices, int]:
-    """Triangles of quadrilaterals and their number in each.
-
-    Parameters
-    ----------
-    faces : (nf, 4) int64
-        Corners in turn; in a mesh twice as fine one is a corner of the first, with the least
-        number, and the one across from it the middle of a face.
-    middle : (nf,) int64 or None
-        Vertex in the middle of each, if it has one.
-    """
+    """Triangles of quadrilaterals and their number in each."""
+    # In a mesh twice as fine a corner of the first mesh has the least number: they begin there.
     if middle is not None:
         ends = np.stack([faces, np.roll(faces, -1, axis=1)], axis=2)
         around = np.broadcast_to(middle[:, None, None], (len(faces), 4, 1))

@@ -141,13 +141,8 @@ class ExplicitFoam:
             self.contact_j -= motion.step_s * float(np.vdot(touched, self._surface @ mean))
 
     def _kept_out(self) -> Array:
-        """Take the step anew with the forces of what the pattern would enter, and give them.
-
-        They act at the start of the step and are just what leaves the gaps closed at its end
-        (forward increment Lagrange multipliers; Carpenter, Taylor and Katona, International Journal
-        for Numerical Methods in Engineering 32, 1991): a vertex stops without rebound, and no
-        stiffness of contact bounds the step.
-        """
+        """Take the step anew with the forces of what the pattern would enter, and give them."""
+        # Forward increment Lagrange multipliers, as in ``contact_step``: no rebound.
         around, free_m = self._surroundings, self.displacement_m
         self.contact_n = np.zeros_like(self.vertices_m)
         if around is None or around.is_clear(free_m, self._clearance):

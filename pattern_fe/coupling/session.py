@@ -156,10 +156,7 @@ class CoupledSession(PatternSession):
             self._shapes.write(sand.time_s, self.displacement_m)
 
     def _measure(self, window_s: float) -> None:
-        """Measure the gain anew: sand that falls, settles or is shaken changes it.
-
-        Without a load the factor stays.
-        """
+        """Measure the gain anew, which moving sand changes; without a load the factor stays."""
         relaxation = self._relaxation
         if isinstance(relaxation, MeasuredRelaxation):
             measured = measure_gain(self.sand, self._body, self._surface, self._next, window_s)

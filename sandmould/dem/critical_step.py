@@ -123,11 +123,9 @@ def _tangents(normal: Floats) -> Floats:
 
 
 def _rows(solver: Solver, ends: _Ends, law: Law) -> ActiveContacts:
-    """Turn springs of eqs. (16), (25) and (29) into rows.
-
-    The slip of grain 2 over grain 1 along a tangent t is
-    (v_2 - v_1) t - (a_1 w_1 + a_2 w_2) (n x t), where in 2D n x t = 1.
-    """
+    """Turn springs of eqs. (16), (25) and (29) into rows."""
+    # The slip of grain 2 over grain 1 along a tangent t is
+    # (v_2 - v_1) t - (a_1 w_1 + a_2 w_2) (n x t), where in 2D n x t = 1.
     n, grains = ends.normal, solver.grains
     c, d = n.shape
     tangents = _tangents(n)

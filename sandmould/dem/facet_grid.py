@@ -77,11 +77,7 @@ def cells_of(grid: FacetGrid, low: Any, high: Any, k: int) -> tuple[int, int]:
 
 @njit(**OPTIONS)
 def _empty(dim: Any, arrays: SurfaceArrays, reach: float) -> FacetGrid:
-    """Lay a grid over all facets.
-
-    Its cells are as large as facets are on average, but not far from the reach of grains, and
-    larger where there would be very many.
-    """
+    """Lay a grid over all facets, its cells about as large as they and as the reach of grains."""
     corner, first_facet = arrays.corner, len(arrays.shape)
     facets, extent = len(corner) - first_facet, 0.0
     low, high = (0.0, 0.0, 0.0), (0.0, 0.0, 0.0)

@@ -312,13 +312,7 @@ class Solver:
     def _together(
         self, loop: Callable[..., Any], steps: int, drifted: bool, displacement_m: Floats, *own: Any
     ) -> tuple[int, int]:
-        """Call a step loop in all threads: arguments as of ``advance``, then its own.
-
-        Returns
-        -------
-        done, state : int
-            See ``advance``; all threads end alike.
-        """
+        """Call a step loop in all threads: arguments and result as of ``advance``, then its own."""
         chunks = len(self.moving.bound) - 1
         threads = min(self._threads, chunks)
         team = Team(

@@ -97,10 +97,7 @@ def _advance(
     table: MountedTable,
     drive: TableDrive,
 ) -> tuple[int, int]:
-    """See ``steps.advance``, which computes every step; the table moves before each.
-
-    ``place`` is its displacement: the first two are given, the others are found.
-    """
+    """See ``steps.advance``; before each step the table moves, of whose ``place`` two are given."""
     done, state = steps, DONE
     one = int(np.int64(1))  # for a literal numba would compile it once more
     for k in range(steps):

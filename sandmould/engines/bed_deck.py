@@ -90,10 +90,7 @@ def render_parts(
 
 
 def _given_anew(text: str, earlier: str) -> str:
-    """Let a part give the numbers that differ from those of an earlier part.
-
-    A number that can be changed from outside is given once, unless it is deleted.
-    """
+    """Let a part give the numbers that differ from an earlier part's, which it deletes first."""
     before = dict(_NUMBER.findall(earlier))
 
     def anew(number: re.Match[str]) -> str:

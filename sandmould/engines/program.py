@@ -197,10 +197,7 @@ def _vibrated_pours(scenario: Scenario, vibration: FillVibration, layers: int) -
 
 
 def _box_stages(scenario: Scenario) -> Iterator[Stage]:
-    """Stages of vibration and rest after the fill, numbered by their place in the scenario.
-
-    The rest that follows the last vibration by default has no number.
-    """
+    """Stages of vibration and rest after the fill; a default rest after the last has no number."""
     planned: list[tuple[int, VibrationStage | RestStage]] = [*enumerate(scenario.vibration, 1)]
     if scenario.measure_at_rest and planned and isinstance(planned[-1][1], VibrationStage):
         longest_s = scenario.fill.settling.longest_s

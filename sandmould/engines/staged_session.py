@@ -111,10 +111,7 @@ class StagedSession(ABC):
 
     @abstractmethod
     def _vertex_sums(self, name: str) -> tuple[Array, int]:
-        """Sum of the loads on a surface's vertices over this check, and its number of samples.
-
-        Right after a check has ended: of the whole of that check.
-        """
+        """Sum of the loads on vertices over this check, or the one just ended, and its samples."""
 
     @abstractmethod
     def _save(self, folder: Path) -> None:
@@ -219,11 +216,7 @@ class StagedSession(ABC):
         radius_m: Array,
         orientation: Array | None = None,
     ) -> Snapshot:
-        """Make a snapshot of all grains, relative to the box, out of what the engine computes with.
-
-        Ids ascend, and all other arrays follow them; places and velocities are given in the frame
-        of the computation.
-        """
+        """Make a snapshot relative to the box from arrays in the order of ids, in their frame."""
         shift, speed = self._box_motion()
         start = self._vibration_start
         shaken = self._stage_start if self.stage.kind is StageKind.REST else self.steps

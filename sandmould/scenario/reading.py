@@ -117,11 +117,7 @@ def _is_sourced(value: Any) -> bool:
 
 
 def _starts_anew(value: Tree, below: Tree) -> bool:
-    """Whether a section excludes the one that it is laid over, whose keys go.
-
-    It states another kind; or either of two ways to hold a pattern is free, which no other goes
-    with.
-    """
+    """Whether a section excludes the one below it: another kind, or one of them is held free."""
     if "kind" in value and "kind" in below:
         return bool(value["kind"] != below["kind"])
     free = value.get("free"), below.get("free")

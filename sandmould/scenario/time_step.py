@@ -87,13 +87,10 @@ def _modes(
     pair_masses: int,
     corrected: bool,
 ) -> tuple[float, float]:
-    """Critical steps of the stiffest normal and rotational mode of equal grains.
-
-    With n contacts a grain the highest normal mode of a lattice has omega^2 = n k_n / m, its
-    share of critical damping is zeta omega / omega_pair with omega_pair^2 = 2 k_n / m (k_n / m at
-    a wall); the highest rotational one has omega^2 = 2 n k_T / (I / r^2) (n k_T at a wall), and
-    no damping, eqs. (50)-(54).
-    """
+    """Critical steps of the stiffest normal and rotational mode of equal grains, eqs. (50)-(54)."""
+    # With n contacts a grain the highest normal mode has omega^2 = n k_n / m and zeta omega /
+    # omega_pair of critical damping, omega_pair^2 = 2 k_n / m (k_n / m at a wall); the highest
+    # rotational one omega^2 = 2 n k_T / (I / r^2) (n k_T at a wall), and no damping.
     omega_n = math.sqrt(contacts * law.normal_stiffness_n_m / mass_kg)
     omega_pair = math.sqrt(pair_masses * law.normal_stiffness_n_m / mass_kg)
     inertia_kg = inertia_factor * mass_kg

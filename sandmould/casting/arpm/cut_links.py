@@ -76,10 +76,7 @@ def _share_in(raster: Raster, solids: Sequence[Body], low: Ints, axis: Ints) -> 
 
 
 def _through(own: Flags, low: Ints, high: Ints, share: Floats) -> tuple[Ints, Floats]:
-    """Links between cells of a material through its parts in cells of the other one.
-
-    The balance of those parts, solved by following heat from one to the next.
-    """
+    """Links between cells of a material, by the heat balance of its parts in cells of another."""
     used = (share > 0.0) & ~(own[low] & own[high])
     row = np.concatenate([low[used], high[used]])
     column = np.concatenate([high[used], low[used]])

@@ -65,12 +65,9 @@ def held_of(raster: Raster, solids: Sequence[Body]) -> Held:
 
 
 def _even_points(cells: Ints, d: int) -> Floats:
-    """Points spread evenly over a unit square or cube for each of some cells, (c, k, d) float64.
-
-    Additive recurrence of the root of x^(d+1) = x + 1 (Roberts, "The unreasonable effectiveness of
-    quasirandom sequences", 2018): no rows that lie on a slope all at once. It goes on from cell to
-    cell, for a slope may cut all cells alike.
-    """
+    """Points spread evenly over a unit square or cube for each of some cells, (c, k, d) float64."""
+    # Additive recurrence of the root of x^(d+1) = x + 1 (Roberts, 2018): no rows that lie on a
+    # slope all at once. It goes on from cell to cell, for a slope may cut all cells alike.
     root = 2.0
     for _ in range(60):
         root = (1.0 + root) ** (1.0 / (d + 1))
@@ -146,11 +143,9 @@ def _places(cells: Ints, casting: Flags) -> Floats:
 
 
 def _levelled(casting: Flags, volume: Floats, lever: Floats) -> Floats:
-    """Share what lies off the centres with the next cells of the same material, by the lever rule.
-
-    Where both neighbours along an axis are of the same material, one loses half and the other gains
-    half; at a surface the cell itself stands for the one that is not there.
-    """
+    """Share what lies off the centres with next cells of the same material, by the lever rule."""
+    # With both neighbours along an axis one loses half and the other gains half; at a surface the
+    # cell itself stands for the one that is not there.
     number, flat = np.arange(casting.size).reshape(casting.shape), casting.reshape(-1)
     moves = []
     for axis in range(casting.ndim):

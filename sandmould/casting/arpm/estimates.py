@@ -200,11 +200,8 @@ def plate_modulus_m(scenario: Solidification, frozen_s: Floats) -> Floats:
 
 
 def _lacks_j_m2(scenario: Solidification, it: Cooled, depth_m: float, time_s: float) -> float:
-    """Heat that the casting has still to lose through its surface before its middle is solid.
-
-    By then its skin is colder than the solidus: on the average half of what drives the heat at that
-    time through the metal.
-    """
+    """Heat that the casting has still to lose through its surface before its middle is solid."""
+    # By then its skin is colder than the solidus, on average by half of what drives the heat.
     metal, poured_k = scenario.casting, scenario.initial_k.casting
     taken = taken_j_m2(scenario, it, depth_m, time_s)
     flux_w_m2 = (taken_j_m2(scenario, it, depth_m, (1.0 + _LATER) * time_s) - taken) / (

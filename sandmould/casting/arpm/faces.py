@@ -209,12 +209,9 @@ def over_faces(first: Ints, second: Ints, conductance_w_k: Floats, volume_m3: Fl
 
 def _shared(elements: Elements, faces: Faces, conductance: Floats
             ) -> tuple[Ints, Ints, Floats, csr_array]:  # fmt: skip
-    """Pairs of small elements on one large face, and what sharing its flux adds between them.
-
-    With shares a_k of the large face, q = h (T_large - sum a_k T_k) on all of it: beside the
-    plain exchange this couples k and l by -a_k a_l times the conductance of the whole face. Last
-    comes how that is made of the faces' conductances.
-    """
+    """Pairs of small elements on a large face, what sharing its flux adds, and that by faces."""
+    # With shares a_k of the large face, q = h (T_large - sum a_k T_k) on all of it: beside the
+    # plain exchange this couples k and l by -a_k a_l times the conductance of the whole face.
     size = elements.size_m
     first_larger = size[faces.first] > size[faces.second] * (1.0 + 1e-9)
     second_larger = size[faces.second] > size[faces.first] * (1.0 + 1e-9)

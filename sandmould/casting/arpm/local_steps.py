@@ -207,10 +207,7 @@ def _local_steps(
     begin: int, stop: int, dt: float, time_s: float, levels: Levels, system: HeatSystem,
     integral: Floats, enthalpy: Floats, temperature: Floats, noted: Floats, new: Floats,
 ) -> None:  # fmt: skip
-    """Take the shortest steps from one to another, both ends of cycles of 2^(levels - 1).
-
-    There all integrals are 0.
-    """
+    """Take shortest steps between two ends of cycles of 2^(levels - 1), where integrals are 0."""
     end = levels.end
     for at in range(begin + 1, stop + 1):
         highest = 0

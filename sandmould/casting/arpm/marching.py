@@ -169,11 +169,7 @@ def _explicit_steps(
     steps: int, dt: float, time_s: float, system: HeatSystem, enthalpy: Floats, temperature: Floats,
     noted: Floats,
 ) -> Floats:  # fmt: skip
-    """Take explicit steps and give the new temperatures; enthalpy and notes change in place.
-
-    Every element sums over its own neighbours in their order, so that the result does not depend
-    on the threads.
-    """
+    """Take explicit steps; an element sums its neighbours in order: threads change nothing."""
     start, neighbour, rate, material, rows, reference = system
     n = len(enthalpy)
     now, then = temperature.copy(), np.empty(n)

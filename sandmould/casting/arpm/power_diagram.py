@@ -64,10 +64,7 @@ def power_exchange(
 
 
 def _edges(elements: Elements) -> tuple[Ints, Ints, Floats, Floats, Floats]:
-    """Faces of real elements: own, other, length, distance of own to it, distance of centres.
-
-    Others from n on are images behind the walls.
-    """
+    """Faces: own, other (from n on an image behind a wall), length, distance of own, of centres."""
     place, number = with_images(elements, REACH * float(elements.size_m.max()))
     scale = float(elements.size_m.max())
     centre = 0.5 * (elements.low_m + elements.high_m)

@@ -260,10 +260,7 @@ class Flow:
         state.position_m += dt * change
 
     def _shift(self) -> None:
-        """Move inner particles to where fewer are, and give them the velocity found there.
-
-        The surface keeps its place.
-        """
+        """Move inner particles to where fewer are, with the velocity there; the surface stays."""
         state, kernel = self.particles, self.kernel
         near = self._neighbours()
         inner = self.fluid & (near.density >= self.scheme.surface * kernel.lattice_density)

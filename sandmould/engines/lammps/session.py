@@ -171,10 +171,7 @@ class LammpsSession(DeckSession):
             self._compute_sampling(self._wall_loads, target)
 
     def _compute_near(self, target: int) -> None:
-        """Compute up to a step; as the deck alone does, in pieces for which near grains are known.
-
-        A piece ends early where a grain became faster than was allowed for.
-        """
+        """Compute in pieces for which near grains are known; a faster grain ends one early."""
         while self.steps < target:
             now = self.steps
             if now >= self._near_until:

@@ -51,11 +51,7 @@ def _environment() -> dict[str, str]:
 
 
 def _live_and_die_with_parent() -> None:
-    """Leave signals that ask for an end to the process that started this one, and end with it.
-
-    A batch system signals every process of a job; the parent ends in an orderly way, with a
-    checkpoint, for which it still needs LIGGGHTS.
-    """
+    """Leave signals to the parent, which ends in an orderly way with a checkpoint; end with it."""
     signal.pthread_sigmask(signal.SIG_BLOCK, (signal.SIGTERM, signal.SIGINT, signal.SIGHUP))
     end_with_parent(signal.SIGKILL)
 
