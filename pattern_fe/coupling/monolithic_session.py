@@ -13,8 +13,8 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
+from sandmould.engines.program import StepCounts
 from sandmould.engines.session import EngineStop, SandSession
-from sandmould.engines.step_counts import StepCounts
 from sandmould.pattern_fe.coupling.body import ElasticBody
 from sandmould.pattern_fe.coupling.convergence_log import force_n, rms_m
 from sandmould.pattern_fe.coupling.explicit_foam import ExplicitFoam

@@ -8,10 +8,9 @@ from pathlib import Path
 import numpy as np
 
 from sandmould.bad_input import BadInputError, Problem
-from sandmould.engines.program import Program
+from sandmould.engines.program import Program, StepCounts
 from sandmould.engines.registry import engine_of
 from sandmould.engines.session import Session
-from sandmould.engines.step_counts import StepCounts
 from sandmould.pattern_fe.coupling.explicit_foam import ExplicitFoam
 from sandmould.pattern_fe.coupling.foam_body import FoamBody
 from sandmould.pattern_fe.coupling.free_body import FreeBody

@@ -7,8 +7,8 @@ from typing import get_args
 from threadpoolctl import threadpool_limits
 
 from sandmould.bad_input import BadInputError, Problem
-from sandmould.engines.capabilities import Capabilities
 from sandmould.engines.registry import engine_of, engines_that
+from sandmould.engines.session import Capabilities
 from sandmould.limits import STEPPED_COMPONENTS
 from sandmould.pattern_fe.coupling.contact_rows import ContactRows
 from sandmould.pattern_fe.coupling.explicit_foam import ContactBound, ExplicitFoam

@@ -9,8 +9,8 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
+from sandmould.engines.program import StepCounts
 from sandmould.engines.session import EngineStop, SandSession
-from sandmould.engines.step_counts import StepCounts
 from sandmould.pattern_fe.coupling.body import ElasticBody, StaticSolution
 from sandmould.pattern_fe.coupling.convergence_log import (
     WindowEntry,

@@ -12,13 +12,11 @@ import numpy as np
 
 from sandmould.dem.barrier import new_barrier
 from sandmould.dem.broad_phase import Candidates, candidates_in
-from sandmould.dem.chunks import chunk_bounds
 from sandmould.dem.facet_grid import FacetGrids
 from sandmould.dem.grains import Floats, Grains
-from sandmould.dem.kinds import pair_up
 from sandmould.dem.lanes import lanes_of_processor
 from sandmould.dem.motion import kick
-from sandmould.dem.moving_state import from_arrays, to_arrays
+from sandmould.dem.moving_state import chunk_bounds, from_arrays, pair_up, to_arrays
 from sandmould.dem.near_pairs import Contacts, contacts_of, move_contacts, near_gap, new_near_pairs
 from sandmould.dem.neighbours import Pairs, extent_of, list_pairs, make_grid, sort_into_cells
 from sandmould.dem.steps import (

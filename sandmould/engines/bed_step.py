@@ -4,9 +4,8 @@ from __future__ import annotations
 
 import math
 
-from sandmould.engines.program import Program
+from sandmould.engines.program import Program, StepCounts
 from sandmould.engines.session import EngineStop
-from sandmould.engines.step_counts import StepCounts
 from sandmould.runs.outcome import Outcome
 from sandmould.runs.products import Cost
 from sandmould.scenario.scenario import Scenario

@@ -11,14 +11,13 @@ from pathlib import Path
 from types import FrameType
 
 from sandmould.engines.bed_step import MOST_AGAIN, limit_moments, limit_notes, with_bed_step
-from sandmould.engines.blockage import what_blocks
 from sandmould.engines.durations import cost_before, grain_steps, run_s
 from sandmould.engines.guard import Guard
-from sandmould.engines.program import Program, Stage, build_program
+from sandmould.engines.program import Program, Stage, StepCounts, build_program
 from sandmould.engines.recording import Recorder
 from sandmould.engines.registry import engine_of
+from sandmould.engines.rest import what_blocks
 from sandmould.engines.session import EngineStop, Session
-from sandmould.engines.step_counts import StepCounts
 from sandmould.runs import checkpoint_folders as checkpoints
 from sandmould.runs.checkpoint_folders import CheckpointMark
 from sandmould.runs.outcome import Outcome, RunOutcome

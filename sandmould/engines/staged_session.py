@@ -15,12 +15,10 @@ from typing import Any, ClassVar, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from sandmould.engines.box_motion import box_motion
-from sandmould.engines.program import Program, Stage
+from sandmould.engines.program import Program, Stage, StepCounts, box_motion
 from sandmould.engines.rest import RestWatch
 from sandmould.engines.session import Array, RefusedError, Shared, StepMover
 from sandmould.engines.snapshot import Snapshot
-from sandmould.engines.step_counts import StepCounts
 from sandmould.engines.table_periods import TablePeriod
 from sandmould.scenario.fill import Settling
 from sandmould.scenario.stages import StageKind

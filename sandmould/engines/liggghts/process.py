@@ -10,15 +10,21 @@ import re
 import select
 import shutil
 import signal
+import struct
 import subprocess
 import termios
 from pathlib import Path
 
+import numpy as np
+
+from sandmould.geometry.geometry import Array
 from sandmould.runs.parent import end_with_parent
 
 _VERSION = re.compile(r"LIGGGHTS-PUBLIC (\d+(?:\.\d+)+)")
 _LOOK_EVERY_S = 1.0
 """How often a silent process is looked at, in case it died without closing its terminal."""
+_HEADER = struct.Struct("=qq7i6dii")
+"""Step, rows, triclinic, six kinds of boundary, six bounds, columns, processors."""
 
 
 def executable() -> str | None:
@@ -154,3 +160,25 @@ def _keep_line_ends(terminal: int) -> None:
     attributes = termios.tcgetattr(terminal)
     attributes[1] &= ~termios.OPOST
     termios.tcsetattr(terminal, termios.TCSANOW, attributes)
+
+
+def read_grains(path: Path) -> Array:
+    """Read a binary dump of one instant, written by one process.
+
+    Gives (n, columns) float64; sorted by the first column, the ids.
+
+    Raises
+    ------
+    ValueError
+        When the file is cut short.
+    """
+    data = path.read_bytes()
+    if len(data) < _HEADER.size + 4:
+        raise ValueError(f"{path}: cut short")
+    header = _HEADER.unpack_from(data)
+    rows, columns = header[1], header[-2]
+    values = np.frombuffer(data, dtype=np.float64, offset=_HEADER.size + 4)
+    if columns < 1 or values.size != rows * columns:
+        raise ValueError(f"{path}: {values.size} numbers instead of {rows} x {columns}")
+    table = values.reshape(rows, columns)
+    return table[np.argsort(table[:, 0])]

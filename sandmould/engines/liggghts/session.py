@@ -11,13 +11,16 @@ import numpy as np
 
 from sandmould.engines.deck import Deck
 from sandmould.engines.deck_session import DeckSession
-from sandmould.engines.liggghts.bending_mesh import BendingMesh
-from sandmould.engines.liggghts.grains_file import read_grains
+from sandmould.engines.liggghts.bending_mesh import BendingMesh, TriangleLoads, read_triangle_loads
 from sandmould.engines.liggghts.mesh_files import outline_strips, write_stl
-from sandmould.engines.liggghts.process import Conversation, LiggghtsDied, executable, version_of
-from sandmould.engines.liggghts.refusals import refuse
-from sandmould.engines.liggghts.render import atoms_data, surface_meshes
-from sandmould.engines.liggghts.vtk_stress import TriangleLoads, read_triangle_loads
+from sandmould.engines.liggghts.process import (
+    Conversation,
+    LiggghtsDied,
+    executable,
+    read_grains,
+    version_of,
+)
+from sandmould.engines.liggghts.render import atoms_data, refuse, surface_meshes
 from sandmould.engines.program import Program
 from sandmould.engines.session import Array, EngineStop, RefusedError, engine_stop
 from sandmould.engines.snapshot import Snapshot

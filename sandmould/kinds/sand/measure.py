@@ -24,8 +24,7 @@ from sandmould.analysis.solid_fraction import (
 )
 from sandmould.analysis.tube_fill import tube_fill
 from sandmould.definition.run import LAST_MEASURED
-from sandmould.engines.snapshot import Snapshot, scene_at
-from sandmould.engines.snapshot_file import stored_snapshots
+from sandmould.engines.snapshot import Snapshot, scene_at, stored_snapshots
 from sandmould.geometry.geometry import Cavity, Scene
 from sandmould.kinds.sand.measures import seeks_loose_sand
 from sandmould.kinds.sand.moments import MOMENTS, list_moments, nearest

@@ -54,7 +54,7 @@ def printed(house: Path, script: str, *given: str) -> str:
 DEM = """
 import numpy as np
 from sandmould.dem.contact_law import Law
-from sandmould.dem.kinds import _pair_up
+from sandmould.dem.moving_state import _pair_up
 table = np.zeros((1, 1, 3))
 _pair_up(np.ones(1), np.array([2.0]), Law(1.0, 1.0, 0.0, 0.5, 0.0, 0.0, True, False), table)
 print(table[0, 0, 0])
