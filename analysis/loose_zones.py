@@ -16,9 +16,9 @@ from numpy.typing import NDArray
 from scipy.ndimage import label
 from scipy.spatial import cKDTree
 
-from sandmould.analysis.bed_density import buried_places
 from sandmould.analysis.free_space import free_part
 from sandmould.analysis.intersections import disc_lens_m2, sphere_lens_m3
+from sandmould.analysis.solid_fraction import buried_places
 from sandmould.analysis.tube_fill import lies_in_bore
 from sandmould.arrays import Centres, Radii
 from sandmould.geometry.geometry import Array, Scene, Solid, Wall, distance_within

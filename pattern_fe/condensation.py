@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 from scipy.linalg import eigh
 from scipy.sparse import csc_array, csr_array
 
-from sandmould.pattern_fe.factor import factorised
+from sandmould.pattern_fe.space import factorised
 from sandmould.pattern_fe.supports import Mask
 
 Array = NDArray[np.float64]

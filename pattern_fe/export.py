@@ -11,9 +11,8 @@ from numpy.typing import NDArray
 from skfem import MeshQuad
 from skfem.io.meshio import to_meshio
 
-from sandmould.pattern_fe.distance import distance_from_drawing
 from sandmould.pattern_fe.loads import vertex_pressure_pa
-from sandmould.pattern_fe.perimeter import Perimeter
+from sandmould.pattern_fe.perimeter import Perimeter, distance_from_drawing
 from sandmould.pattern_fe.space import Space
 
 Array = NDArray[np.float64]

@@ -14,9 +14,8 @@ from sandmould.pattern_fe.elasticity import (
     element_tangent_n_m,
     internal_force_n,
 )
-from sandmould.pattern_fe.factor import factorised
 from sandmould.pattern_fe.material import Foam
-from sandmould.pattern_fe.space import Space
+from sandmould.pattern_fe.space import Space, factorised
 from sandmould.pattern_fe.supports import Mask
 from sandmould.pattern_fe.surroundings import Surroundings
 

@@ -20,12 +20,11 @@ from sandmould.pattern_fe.elasticity import (
     small_strain,
     von_mises_pa,
 )
-from sandmould.pattern_fe.factor import factorised
 from sandmould.pattern_fe.large_displacement import NewtonSettings, solve_large
 from sandmould.pattern_fe.material import Foam
 from sandmould.pattern_fe.motion import CentralDifferences
 from sandmould.pattern_fe.perimeter import perimeter_of
-from sandmould.pattern_fe.space import space_of
+from sandmould.pattern_fe.space import factorised, space_of
 from sandmould.pattern_fe.supports import Supports, check_held, fixed_components, loose_motions
 from sandmould.pattern_fe.surroundings import Surroundings
 from sandmould.pattern_fe.weak_forms import element_stiffness_n_m

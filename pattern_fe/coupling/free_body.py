@@ -12,8 +12,8 @@ from scipy.sparse.linalg import SuperLU
 from sandmould.pattern_fe.coupling.body import StaticSolution
 from sandmould.pattern_fe.coupling.foam_body import cross
 from sandmould.pattern_fe.coupling.in_step_foam import InStepFoam
-from sandmould.pattern_fe.factor import factorised
 from sandmould.pattern_fe.pattern import Pattern
+from sandmould.pattern_fe.space import factorised
 from sandmould.pattern_fe.supports import rigid_motions
 
 Array = NDArray[np.float64]

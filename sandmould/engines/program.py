@@ -11,8 +11,7 @@ import numpy as np
 
 from sandmould.geometry.geometry import Array
 from sandmould.scenario.box import Piston
-from sandmould.scenario.discharge import FLOW_SETTLING, Discharge
-from sandmould.scenario.fill import FillVibration, Settling
+from sandmould.scenario.fill import FLOW_SETTLING, Discharge, FillVibration, Settling
 from sandmould.scenario.placement import PlannedLayer, plan_counts, plan_layer, portion_of
 from sandmould.scenario.scenario import Scenario
 from sandmould.scenario.stages import StageKind

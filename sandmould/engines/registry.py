@@ -14,9 +14,8 @@ from sandmould.digest import code_identity, digest
 from sandmould.engines.deck import Deck, dialect_hash, template_files
 from sandmould.engines.program import Program, build_program
 from sandmould.engines.session import Capabilities, Ranks, RefusedError, SandSession
-from sandmould.scenario.checks.unbalance import unbalance_key
+from sandmould.scenario.checks.moving import moving_wall, unbalance_key
 from sandmould.scenario.engine import ENGINE_NAMES, DeckReader, EngineName
-from sandmould.scenario.moving_walls import moving_wall
 from sandmould.scenario.pattern import PatternDrawing
 from sandmould.scenario.scenario import Scenario
 from sandmould.scenario.solids import SolidMesh

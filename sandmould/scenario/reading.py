@@ -17,9 +17,15 @@ from pydantic import BaseModel, ValidationError
 from sandmould.bad_input import BadInputError, Problem
 from sandmould.limits import YAML_BYTES
 from sandmould.plain_file import read_plain
-from sandmould.scenario.moved_keys import called, holds_anyway, instead_of
 from sandmould.scenario.quantity import units_at
-from sandmould.scenario.standing_keys import standing_keys, standing_kinds, standing_lengths
+from sandmould.scenario.standing_keys import (
+    called,
+    holds_anyway,
+    instead_of,
+    standing_keys,
+    standing_kinds,
+    standing_lengths,
+)
 from sandmould.scenario.units import in_kelvin, number_of
 from sandmould.scenario.yaml_text import fault_of, load_planned, load_users
 

@@ -15,9 +15,8 @@ from sandmould.geometry.geometry import Scene
 from sandmould.scenario.box import Box, Obstacle, Piston, Plate, build_scene, piston_wall
 from sandmould.scenario.cavities import CavityKey, cavity_space
 from sandmould.scenario.contact import BackgroundDamping, Contact, springs_in_use
-from sandmould.scenario.discharge import Discharge
 from sandmould.scenario.engine import Engine
-from sandmould.scenario.fill import Fill
+from sandmould.scenario.fill import Discharge, Fill
 from sandmould.scenario.pattern import PatternConfig
 from sandmould.scenario.quantity import Section, quantity
 from sandmould.scenario.rest import Rest

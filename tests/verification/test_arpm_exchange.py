@@ -13,7 +13,7 @@ from sandmould.casting.arpm.kernel import kernel_exchange
 from sandmould.casting.arpm.local_steps import LocalSteps
 from sandmould.casting.arpm.marching import ExplicitSteps, Substance
 from sandmould.casting.arpm.material import ThermalMaterial
-from sandmould.casting.arpm.power_diagram import power_exchange
+from sandmould.casting.arpm.method import power_exchange
 from sandmould.casting.arpm.raster import Raster
 from sandmould.casting.arpm.super_steps import SuperSteps
 from tests.verification.castings.growth import grows_beyond_s

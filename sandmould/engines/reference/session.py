@@ -20,8 +20,7 @@ from sandmould.engines.staged_session import StagedSession
 from sandmould.engines.table_periods import TablePeriod, TablePeriods, window_of
 from sandmould.runs.outcome import Outcome
 from sandmould.scenario.box import piston_wall
-from sandmould.scenario.discharge import slid_away_m
-from sandmould.scenario.fill import Settling
+from sandmould.scenario.fill import Settling, slid_away_m
 from sandmould.scenario.scenario import Scenario
 from sandmould.scenario.stages import StageKind
 from sandmould.scenario.unbalance import BRAKE_PERIODS, Unbalance
