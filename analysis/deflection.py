@@ -29,10 +29,8 @@ class Deflection:
 def farthest_corner(drawn_m: Array, held_m: Array) -> int:
     """Vertex of an outline farthest from what holds it: the tip of the flange of an L.
 
-    Of several the one farthest to the right.
-
-    ``drawn_m``, (nv, d) float64, m: vertices as drawn. ``held_m``, (k, d) float64, m: points that
-    do not move.
+    Of several the one farthest to the right. ``drawn_m``, (nv, d) float64, m: vertices as drawn.
+    ``held_m``, (k, d) float64, m: points that do not move.
 
     Raises
     ------

@@ -40,10 +40,8 @@ def disc_lens_m2(distance_m: Array, first_radius_m: Array, second_radius_m: Arra
     """Area common to two discs, also when apart or one inside the other, (n,) float64, m2.
 
     The line of equal power cuts both discs along their common chord, so the lens is a segment of
-    each.
-
-    ``distance_m``, (n,) float64, m: between the centres. ``first_radius_m``, ``second_radius_m``:
-    (n,) float64, m.
+    each. ``distance_m``, (n,) float64, m: between the centres. ``first_radius_m``,
+    ``second_radius_m``: (n,) float64, m.
     """
     first, second = _to_common_chord(distance_m, first_radius_m, second_radius_m)
     return disc_segment_m2(first, first_radius_m) + disc_segment_m2(second, second_radius_m)

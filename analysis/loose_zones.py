@@ -90,10 +90,8 @@ def find_loose_sand(
     """Find the zones of loose sand.
 
     Places are the cells of a grid that lie in free space and at least a ball's radius below the
-    surface of the sand there.
-
-    ``scene``: its walls must close the box on every side; in 3D they must be upright or level.
-    ``grain_m``: diameter of the mass-median grain.
+    surface of the sand there. ``scene``: its walls must close the box on every side; in 3D they
+    must be upright or level. ``grain_m``: diameter of the mass-median grain.
     """
     ball_m, cell_m = 0.5 * BALL_GRAINS * grain_m, grain_m / CELLS_A_GRAIN
     grid, is_buried = buried_places(position_m, radius_m, ball_m, cell_m)

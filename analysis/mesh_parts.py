@@ -95,9 +95,7 @@ def mesh_below_m3(mesh: TriangleMesh, height_m: Array) -> Array:
     """Volume of a closed mesh under each height, exact, (m,) float64, m3.
 
     By the divergence theorem it is the sum, over the triangles' parts below the height, of the
-    integral of the depth under it times the slope of the triangle.
-
-    ``height_m``: (m,) float64, m.
+    integral of the depth under it times the slope of the triangle. ``height_m``: (m,) float64, m.
     """
     corners_m = mesh.corners_m
     # twice the area seen from above, negative for a triangle that faces down

@@ -154,10 +154,9 @@ def fit_flank(name: str, distance_m: Array, height_m: Array, foot: float = FOOT)
     """Fit a line to a slope that rises along the given points.
 
     The slope is the median of those of all pairs of points (Theil 1950, Sen 1968), so that a few
-    grains on the surface do not turn it.
-
-    ``distance_m``, ``height_m``, (k,) float64, m: profile from foot to crest; only heights between
-    ``foot`` and ``CREST`` of its largest, from the last point below that range on, are fitted.
+    grains on the surface do not turn it. ``distance_m``, ``height_m``, (k,) float64, m: profile
+    from foot to crest; only heights between ``foot`` and ``CREST`` of its largest, from the last
+    point below that range on, are fitted.
     """
     crest_m = float(height_m.max(initial=0.0))
     top = int(np.argmax(height_m >= CREST * crest_m)) if len(height_m) else 0

@@ -147,9 +147,8 @@ def own_solid_fraction(position_m: Centres, radius_m: Radii, scene: Scene, grain
 
     It is the share of the places of a grid that lie in sand; one in two grains counts twice.
 
-    NaN where less than the space of some twenty grains is so far from all of these.
-
-    ``grain_m``, float, m: diameter of the mass-median grain.
+    NaN where less than the space of some twenty grains is so far from all of these. ``grain_m``,
+    float, m: diameter of the mass-median grain.
     """
     if not len(position_m):
         return np.nan

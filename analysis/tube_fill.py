@@ -81,9 +81,7 @@ def tube_shares(
 ) -> dict[int, float]:
     """Share of the sand in a tube that each layer of fill has brought, by its number.
 
-    They add to 1; there are none where there is no sand.
-
-    ``layer``: (n,) int64.
+    They add to 1; there are none where there is no sand. ``layer``: (n,) int64.
     """
     number, row = np.unique(layer, return_inverse=True)
     sand = np.bincount(row, weights=sand_in_bore(position_m, radius_m, bore))

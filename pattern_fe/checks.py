@@ -49,7 +49,7 @@ def check_mesh(mesh: Any) -> None:
 
 
 def check_inside(place_m: Array, low_m: Array, high_m: Array, hint: str = "") -> None:
-    """Refuse a pattern that reaches out of a box.
+    """Refuse a pattern that reaches out of a box (ValueError).
 
     Parameters
     ----------
@@ -59,10 +59,6 @@ def check_inside(place_m: Array, low_m: Array, high_m: Array, hint: str = "") ->
         Corners of the box; a pattern may touch its walls.
     hint : str, optional
         What else to say of one outside.
-
-    Raises
-    ------
-    ValueError
     """
     least, most = place_m.min(axis=0), place_m.max(axis=0)
     # seven digits of an STL file may put a face on a wall out of it

@@ -26,7 +26,6 @@ def write_surface(
 
     Points lie where the vertices are, each with its displacement and its distance from the drawing,
     positive outside it; with loads also these and the pressure (56), per area as drawn.
-
     ``perimeter``: as drawn. ``displacement_m``, ``load_n``, (nv, d) float64, m and N: of the
     vertices.
     """

@@ -15,9 +15,8 @@ _FACING = 0.5
 def vertex_pressure_pa(perimeter: Perimeter, load_n: Array) -> Array:
     """Pressure whose force on a vertex has the load's part along its normal, (nv,) float64, Pa.
 
-    On flat parts it is the normal part of (56), positive in compression; at a corner it is that
-    of a uniform pressure, where (56) has too small a value: the vertex's areas face two ways.
-
+    On flat parts it is the normal part of (56), positive in compression; at a corner it is that of
+    a uniform pressure, where (56) has too small a value: the vertex's areas face two ways.
     ``load_n``: (nv, d) float64, N.
     """
     area = perimeter.vertex_area_vector_m2

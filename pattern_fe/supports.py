@@ -128,12 +128,7 @@ def _loose_of_body(node_m: Array, fixed: Mask) -> list[str]:
 
 
 def check_held(space: Space, fixed: Mask, supports: Supports) -> None:
-    """Refuse statics of a pattern that can move without deforming.
-
-    Raises
-    ------
-    ValueError
-    """
+    """Refuse statics of a pattern that can move without deforming (ValueError)."""
     if supports.bedding_n_m3 > 0.0:
         return
     loose = loose_motions(space, fixed)

@@ -193,11 +193,9 @@ class Surroundings:
     def is_clear(self, moved_m: Array, since: Clearance | None = None) -> bool:
         """Whether nothing touches, at next to no cost; False where that is not known.
 
-        Floor and walls are planes. An obstacle touches no vertex that has gone less far than it
-        was away, and its corners no facet whose vertices have.
-
-        ``moved_m``: (nv, d) float64, m. ``since``: that it has moved from; the drawing unless
-        given.
+        Floor and walls are planes. An obstacle touches no vertex that has gone less far than it was
+        away, and its corners no facet whose vertices have. ``moved_m``: (nv, d) float64, m.
+        ``since``: that it has moved from; the drawing unless given.
         """
         if self.wall_gaps_m(moved_m).min(initial=0.0) < 0.0:
             return False

@@ -21,10 +21,7 @@ class PatternRest:
     """
 
     def __init__(self, sand: SandSession, load_tolerance: float | None) -> None:
-        """Watch a pattern.
-
-        ``load_tolerance``: ``rest.load_tolerance``; None holds no stage.
-        """
+        """Watch a pattern. ``load_tolerance``: ``rest.load_tolerance``; None holds no stage."""
         self._sand = sand
         self.share = np.inf if load_tolerance is None else 0.5 * load_tolerance
         """Part of the way that may be left."""

@@ -37,12 +37,7 @@ def can_couple(scheme: Scheme, engine: Capabilities) -> bool:
 
 
 def refuse_scheme(scenario: Scenario, pattern: Pattern) -> None:
-    """Refuse a scheme that cannot go with the rest of the scenario.
-
-    Raises
-    ------
-    BadInputError
-    """
+    """Refuse a scheme that cannot go with the rest of the scenario (BadInputError)."""
     assert scenario.pattern is not None
     loop, scheme = scenario.pattern.loop, scenario.pattern.loop.scheme
     name, engine = scenario.engine.name, engine_of(scenario).CAPABILITIES

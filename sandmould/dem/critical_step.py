@@ -212,7 +212,6 @@ def whole_step(contacts: ActiveContacts, of_step_s: float | None = None) -> Stab
     """Eigenproblem of all grains together.
 
     The damped step is exact for central differences, whether or not the modes are damped alike.
-
     ``of_step_s``: step that dashpots are corrected for; by default the limit itself.
     """
     if not len(contacts.first):

@@ -175,9 +175,7 @@ class Solver:
         """Go on with the step of the scene from a state that was computed with another one.
 
         Velocities stood half of the other step before now, and now stand half of this one before
-        it. The box must stand.
-
-        ``steps``: those that count as done from now on.
+        it. The box must stand. ``steps``: those that count as done from now on.
         """
         scene, grains = self.scene, self.grains
         lag_s = 0.5 * (earlier_s - scene.dt)
@@ -279,11 +277,7 @@ class Solver:
         """Compute as many steps as displacements are given, less two.
 
         ``displacement_m``, (steps + 2,) float64, m: of the box along its direction, from one step
-        before now to one step beyond the last.
-
-        Raises
-        ------
-        NotANumberError
+        before now to one step beyond the last. Raises NotANumberError.
         """
         steps, done, drifted = len(displacement_m) - 2, 0, False
         while done < steps:

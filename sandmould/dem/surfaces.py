@@ -95,10 +95,8 @@ class Surfaces:
     def add_plane(self, name: str, point_m: ArrayLike, normal: ArrayLike) -> None:
         """Add an unbounded plane with the sand on the side of its normal.
 
-        A grain whose centre has passed it is still pushed back.
-
-        ``point_m``, (d,) float64, m: any point of the plane. ``normal``, (d,) float64: of any
-        length.
+        A grain whose centre has passed it is still pushed back. ``point_m``, (d,) float64, m: any
+        point of the plane. ``normal``, (d,) float64: of any length.
         """
         d = self.dimension
         shape = np.zeros((1, 7))

@@ -134,11 +134,7 @@ class TableSolver(Solver):
         ``drive``: its length is the number of steps.
 
         Gives (steps + 2,) float64, m; places of the table, from one step before the first to one
-        step beyond the last.
-
-        Raises
-        ------
-        NotANumberError
+        step beyond the last. Raises NotANumberError.
         """
         places = np.zeros(len(drive.push_n) + 2)
         places[:2] = self.table_places_m

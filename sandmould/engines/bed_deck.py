@@ -64,9 +64,8 @@ def render_parts(
 ) -> Deck:
     """Render a deck, in two parts where it takes its time step from the filled bed.
 
-    Before the bed is known the planned step stands in the second part too.
-
-    ``context_of``: names and values for the templates, of a program.
+    Before the bed is known the planned step stands in the second part too. ``context_of``: names
+    and values for the templates, of a program.
     """
     scenario, filled = program.scenario, program.fill_stages
     if not scenario.takes_step_of_bed or filled == len(program.stages):

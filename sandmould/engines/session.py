@@ -163,10 +163,8 @@ class Session(Protocol):
     def set_state(self, position_m: Array, velocity_m_s: Array, spin_rad_s: Array) -> None:
         """Place all grains now in the box exactly, without contact history.
 
-        Meant for verification: a stage must be started after it.
-
-        ``position_m``, ``velocity_m_s``, (n, d) float64, m and m/s: in the order of ids.
-        ``spin_rad_s``: (n, 3) float64, rad/s.
+        Meant for verification: a stage must be started after it. ``position_m``, ``velocity_m_s``,
+        (n, d) float64, m and m/s: in the order of ids. ``spin_rad_s``: (n, 3) float64, rad/s.
         """
 
     def start_stage(self, stage: Stage) -> None:
@@ -246,29 +244,17 @@ class SandSession(Session, Protocol):
 
         ``name``: a surface made of facets.
 
-        (nv, d) float64, N; None when no load was sampled since.
-
-        Raises
-        ------
-        RefusedError
+        (nv, d) float64, N; None when no load was sampled since. Raises RefusedError.
         """
 
     def move_surface(self, name: str, vertices_m: Array, window_s: float) -> None:
-        """Move a surface to new vertices over the next window, or refuse.
-
-        Raises
-        ------
-        RefusedError
-        """
+        """Move a surface to new vertices over the next window, or refuse. Raises RefusedError."""
 
     def save_checkpoint(self) -> Any:
         """Give all that is needed to compute on from here, in memory, or refuse.
 
-        For another iteration of a window; ``write_checkpoint`` is for another process.
-
-        Raises
-        ------
-        RefusedError
+        For another iteration of a window; ``write_checkpoint`` is for another process. Raises
+        RefusedError.
         """
 
     def restore_checkpoint(self, checkpoint: Any) -> None:
@@ -277,9 +263,5 @@ class SandSession(Session, Protocol):
     def attach_mover(self, name: str, mover: StepMover) -> None:
         """Let a surface be moved in every step by the loads on it, or refuse.
 
-        A session opened from a checkpoint is given it again.
-
-        Raises
-        ------
-        RefusedError
+        A session opened from a checkpoint is given it again. Raises RefusedError.
         """

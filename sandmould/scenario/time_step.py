@@ -62,10 +62,9 @@ def damped_step(omega_rad_s: float, damping_ratio: float, correction_per_s: floa
     """Critical step of one mode, eq. (42), h = omega dt: h^2 + 4 xi h = 4.
 
     Corrected dashpots, c' = c/(1 + b dt), are the weaker the longer the step that they are found
-    for: h^2 + 4 xi h/(1 + b h/omega) = 4.
-
-    ``damping_ratio``: xi of the mode, that of plain dashpots. ``correction_per_s``: b = c/(4 m) of
-    its contacts with m of eq. (21), at most xi omega; 0 of plain dashpots.
+    for: h^2 + 4 xi h/(1 + b h/omega) = 4. ``damping_ratio``: xi of the mode, that of plain
+    dashpots. ``correction_per_s``: b = c/(4 m) of its contacts with m of eq. (21), at most xi
+    omega; 0 of plain dashpots.
     """
     xi, b = damping_ratio, correction_per_s / omega_rad_s
     if b == 0.0:

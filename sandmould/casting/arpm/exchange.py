@@ -32,10 +32,8 @@ class Exchange:
         """Longest stable explicit step of each element, (n,) float64, s.
 
         Half the row sum of Gershgorin's circle; where all rates are positive, temperatures then
-        stay between those of the neighbours before the step.
-
-        ``capacity_j_m3_k``, (n,) float64, J/m3/K: without latent heat, which only slows an element
-        down.
+        stay between those of the neighbours before the step. ``capacity_j_m3_k``, (n,) float64,
+        J/m3/K: without latent heat, which only slows an element down.
         """
         size = np.add.reduceat(np.abs(self._padded()), self.start[:-1])
         total = np.add.reduceat(self._padded(), self.start[:-1])

@@ -146,9 +146,7 @@ def kernel_exchange(elements: Elements, conductivity_w_m_k: Floats,
 def check_sizes(elements: Elements, kernel_size: float) -> None:
     """Refuse elements smaller than 1/c_k of one within whose reach they lie (section 4.3.2).
 
-    Raises
-    ------
-    ValueError
+    Raises ValueError.
     """
     own, other, _ = neighbours(elements, kernel_size)
     _check_ratio(elements.size_m[own], elements.size_m[other], kernel_size)

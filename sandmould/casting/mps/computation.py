@@ -74,11 +74,9 @@ def columns_of(scenario: MetalFlow) -> list[str]:
 def compute(scenario: MetalFlow, folder: Path, run: str) -> Computed:
     """Compute a flow from its newest checkpoint, or from its beginning.
 
-    A tank is run to see whether its setting holds: a guard that stops it is the answer, and the
-    run has finished. Pouring that a guard stops has failed.
-
-    ``folder``: the run's; products are written to its ``work``. ``run``: its name, for the line of
-    progress.
+    A tank is run to see whether its setting holds: a guard that stops it is the answer, and the run
+    has finished. Pouring that a guard stops has failed. ``folder``: the run's; products are written
+    to its ``work``. ``run``: its name, for the line of progress.
     """
     work = folder / "work"
     work.mkdir(parents=True, exist_ok=True)

@@ -76,10 +76,7 @@ def _both_ways(n: int, pair: Ints, kind: Kinds) -> tuple[Ints, NDArray[np.uint32
 
 
 def find_candidates(kernel: Kernel, position_m: Floats, kind: Kinds) -> VerletList:
-    """List candidates.
-
-    ``position_m``, (n, 3) float64, m: finite. ``kind``: (n,) int8.
-    """
+    """List candidates. ``position_m``, (n, 3) float64, m: finite. ``kind``: (n,) int8."""
     period = np.asarray(kernel.period_m)
     cyclic = period > 0.0
     wrapped = position_m.copy()

@@ -36,10 +36,7 @@ class WallLoads:
     """Loads on LAMMPS's own walls over a check: a fix made anew in one forgets what it had."""
 
     def __init__(self, lmp: Any, surfaces: Sequence[str], dimension: int) -> None:
-        """Begin with no sample.
-
-        ``surfaces``: walls and blocks, each with a compute of the deck.
-        """
+        """Begin with no sample. ``surfaces``: walls and blocks, each with a compute of the deck."""
         self._lmp = lmp
         self._computes = [f"load_{name}" for name in surfaces]
         self.sums: Array = np.zeros((len(surfaces), dimension))
@@ -89,10 +86,7 @@ class LammpsSession(DeckSession):
     ) -> None:
         """Start LAMMPS on a deck, afresh or from a checkpoint.
 
-        Raises
-        ------
-        RefusedError
-        EngineStop
+        Raises RefusedError or EngineStop.
         """
         refuse(program.scenario)
         super().__init__(program, deck)

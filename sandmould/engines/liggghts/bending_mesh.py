@@ -76,10 +76,7 @@ class BendingMesh:
     """Strips across the plane of the discs along an outline, one between two vertices."""
 
     def __init__(self, name: str, vertices_m: Array) -> None:
-        """Lie as drawn.
-
-        ``vertices_m``, (nv, 2) float64, m: of the closed outline in order.
-        """
+        """Lie as drawn. ``vertices_m``, (nv, 2) float64, m: of the closed outline in order."""
         self.name = name
         self._vertices_m = vertices_m
         self.sums_n = np.zeros_like(vertices_m)
@@ -102,9 +99,8 @@ class BendingMesh:
     def add(self, loads: TriangleLoads, begins_check: bool) -> None:
         """Add a sample: half of what a triangle bears to each end of the side it stands on.
 
-        So force is kept, and moment but for where on its side a grain lies.
-
-        ``begins_check``: whether samples up to now belong to an earlier check.
+        So force is kept, and moment but for where on its side a grain lies. ``begins_check``:
+        whether samples up to now belong to an earlier check.
         """
         if begins_check:
             self.sums_n, self.samples = np.zeros_like(self.sums_n), 0

@@ -134,12 +134,7 @@ def rolling_model(contact: Contact) -> RollingModel | None:
 
 
 def refuse_law(contact: Contact) -> None:
-    """Refuse a law that the contact model cannot say.
-
-    Raises
-    ------
-    RefusedError
-    """
+    """Refuse a law that the contact model cannot say (RefusedError)."""
     if contact.slip_normal == "half_step":
         raise RefusedError("contact.slip_normal", "half_step", "full_step on engine liggghts")
     for name in ("grain_grain", "grain_wall"):

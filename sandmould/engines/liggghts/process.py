@@ -74,10 +74,7 @@ class Conversation:
     """
 
     def __init__(self, path: str, folder: Path, log: Path) -> None:
-        """Start LIGGGHTS.
-
-        ``folder``: working folder, so that a deck's relative names hold.
-        """
+        """Start LIGGGHTS. ``folder``: working folder, so that a deck's relative names hold."""
         self._screen, theirs = pty.openpty()
         _keep_line_ends(theirs)
         self._process = subprocess.Popen(
@@ -99,9 +96,7 @@ class Conversation:
     def say(self, commands: str) -> str:
         """Have commands executed and wait for their end; gives what LIGGGHTS printed meanwhile.
 
-        Raises
-        ------
-        LiggghtsDied
+        Raises LiggghtsDied.
         """
         self._requests += 1
         marker = f"<sandmould {self._requests}>"

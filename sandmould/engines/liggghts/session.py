@@ -46,12 +46,8 @@ class LiggghtsSession(DeckSession):
     ) -> None:
         """Start LIGGGHTS on a deck, afresh or from a checkpoint.
 
-        ``log``: LIGGGHTS's own log; files that are read at once lie beside it.
-
-        Raises
-        ------
-        RefusedError
-        EngineStop
+        ``log``: LIGGGHTS's own log; files that are read at once lie beside it. Raises RefusedError
+        or EngineStop.
         """
         refuse(program.scenario)
         path = executable()
