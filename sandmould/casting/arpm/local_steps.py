@@ -17,13 +17,7 @@ from numba import prange, set_num_threads
 
 from sandmould.arrays import Floats, Ints
 from sandmould.casting.arpm.exchange import Exchange
-from sandmould.casting.arpm.marching import (
-    STEP_SHARE,
-    Heat,
-    HeatSystem,
-    Substance,
-    note,
-)
+from sandmould.casting.arpm.marching import STEP_SHARE, Heat, HeatSystem, Substance, note
 from sandmould.casting.arpm.material import temperature_of
 from sandmould.casting.arpm.varying import VaryingFaces, changed
 from sandmould.compiled import njit

@@ -9,13 +9,7 @@ import numpy as np
 
 from sandmould.arrays import Flags, Floats
 from sandmould.casting.mps.flow import Flow, FlowGuard
-from sandmould.casting.mps.particles import (
-    FLUID,
-    WALL_LAYERS,
-    at_rest,
-    lattice,
-    mould_around,
-)
+from sandmould.casting.mps.particles import FLUID, WALL_LAYERS, at_rest, lattice, mould_around
 from sandmould.casting.mps.scheme import LiquidMetal, Scheme
 from sandmould.casting.mps.weight import make_kernel
 
