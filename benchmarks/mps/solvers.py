@@ -18,8 +18,7 @@ from scipy.sparse.linalg import cg, spsolve
 from benchmarks.mps.peers import PYTHON
 from benchmarks.mps.runs import LARGE_M
 from sandmould.casting.mps.flow import Flow
-from sandmould.casting.mps.overrelaxation import System, solve
-from sandmould.casting.mps.pressure import assemble
+from sandmould.casting.mps.pressure import System, assemble, solve
 from sandmould.casting.mps.scene import open_tank
 from sandmould.casting.mps.scheme import Scheme
 from sandmould.casting.mps.shoulder import open_shoulder

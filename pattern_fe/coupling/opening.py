@@ -14,11 +14,10 @@ from sandmould.engines.session import Session
 from sandmould.pattern_fe.coupling.explicit_foam import ExplicitFoam
 from sandmould.pattern_fe.coupling.foam_body import FoamBody
 from sandmould.pattern_fe.coupling.free_body import FreeBody
-from sandmould.pattern_fe.coupling.in_step import InStepSession
-from sandmould.pattern_fe.coupling.monolithic_session import MonolithicSession
 from sandmould.pattern_fe.coupling.schemes import explicit_foam, in_step_foam
 from sandmould.pattern_fe.coupling.selective_mass import SelectiveMass
 from sandmould.pattern_fe.coupling.session import CoupledSession
+from sandmould.pattern_fe.coupling.stepped_sessions import InStepSession, MonolithicSession
 from sandmould.pattern_fe.pattern import Pattern
 from sandmould.pattern_fe.scene import pattern_of, surroundings_of
 from sandmould.scenario.pattern import PatternDrawing

@@ -11,8 +11,7 @@ from typing import Any
 import numpy as np
 
 from sandmould.dem.barrier import new_barrier
-from sandmould.dem.broad_phase import Candidates, candidates_in
-from sandmould.dem.facet_grid import FacetGrids
+from sandmould.dem.broad_phase import Candidates, FacetGrids, candidates_in
 from sandmould.dem.grains import Floats, Grains
 from sandmould.dem.lanes import lanes_of_processor
 from sandmould.dem.motion import kick

@@ -8,7 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from sandmould.engines.snapshot import Snapshot
-from sandmould.scenario.rest import Rest
+from sandmould.scenario.fill import Rest
 from sandmould.scenario.scenario import Scenario
 
 STUCK_FRACTION = 0.3

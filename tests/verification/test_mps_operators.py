@@ -16,9 +16,18 @@ from sandmould.casting.mps.operators import (
     pressure_gradient,
     velocity_gradient,
 )
-from sandmould.casting.mps.particles import FLUID, WALL, Particles, at_rest, lattice
+from sandmould.casting.mps.particles import (
+    FLUID,
+    WALL,
+    Kernel,
+    Particles,
+    at_rest,
+    lattice,
+    make_kernel,
+    weight,
+    weight_slope,
+)
 from sandmould.casting.mps.scheme import LiquidMetal, Scheme
-from sandmould.casting.mps.weight import Kernel, make_kernel, weight, weight_slope
 
 SIZE_M = 2e-3
 SLOPE = np.array([3.0, -2.0, 1.5])

@@ -30,10 +30,9 @@ from sandmould.casting.mps.operators import (
     pressure_gradient,
     velocity_gradient,
 )
-from sandmould.casting.mps.particles import FLUID, Floats, Kinds, Particles
+from sandmould.casting.mps.particles import FLUID, OPTIONS, Floats, Kernel, Kinds, Particles
 from sandmould.casting.mps.pressure import solve_pressure
 from sandmould.casting.mps.scheme import SOURCES, VISCOUS_SHARE, LiquidMetal, Scheme, Tentative
-from sandmould.casting.mps.weight import OPTIONS, Kernel
 from sandmould.compiled import njit
 
 MOULD_SHARE = 0.2

@@ -10,8 +10,7 @@ from numpy.typing import NDArray
 from scipy.spatial import cKDTree
 
 from sandmould.arrays import Floats, Ints
-from sandmould.casting.mps.particles import DUMMY, Kinds
-from sandmould.casting.mps.weight import INLINED, OPTIONS, Kernel, weight
+from sandmould.casting.mps.particles import DUMMY, INLINED, OPTIONS, Kernel, Kinds, weight
 from sandmould.compiled import njit
 
 SKIN = 0.35

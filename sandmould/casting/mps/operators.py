@@ -12,8 +12,16 @@ import math
 import numpy as np
 
 from sandmould.casting.mps.neighbours import Neighbours
-from sandmould.casting.mps.particles import DUMMY, FLUID, Floats, Kinds
-from sandmould.casting.mps.weight import INLINED, OPTIONS, Kernel, weight_slope
+from sandmould.casting.mps.particles import (
+    DUMMY,
+    FLUID,
+    INLINED,
+    OPTIONS,
+    Floats,
+    Kernel,
+    Kinds,
+    weight_slope,
+)
 from sandmould.compiled import njit
 
 LEAST, DIFFERENCE, SUM, CORRECTED, PRINTED = range(5)

@@ -8,8 +8,7 @@ import numpy as np
 
 from sandmould.arrays import Floats, Ints
 from sandmould.casting.mps.flow import Flow
-from sandmould.casting.mps.particles import DUMMY
-from sandmould.casting.mps.weight import weight
+from sandmould.casting.mps.particles import DUMMY, weight
 
 
 def pressure_at(flow: Flow, place_m: Floats) -> Floats:

@@ -21,6 +21,7 @@ from sandmould.casting.mps.particles import (
     Particles,
     at_rest,
     lattice,
+    make_kernel,
     mould_around,
 )
 from sandmould.casting.mps.scheme import G_M_S2, VISCOUS_SHARE, LiquidMetal, Scheme
@@ -33,7 +34,6 @@ from sandmould.casting.mps.shoulder import (
     ring_m,
     stream,
 )
-from sandmould.casting.mps.weight import make_kernel
 from sandmould.scenario.casting.flow import MetalFlow, ShoulderedCylinder, StillTank
 
 FEWEST = 4

@@ -21,8 +21,7 @@ from sandmould.casting.mps.operators import (
     divergence,
     velocity_gradient,
 )
-from sandmould.casting.mps.particles import Floats, Kinds
-from sandmould.casting.mps.weight import Kernel
+from sandmould.casting.mps.particles import Floats, Kernel, Kinds
 
 VISCOUS_SHARE = 0.2
 """Of r0^2/nu, the longest stable explicit step of the viscosity (0.3 on a square lattice)."""

@@ -9,9 +9,15 @@ import numpy as np
 
 from sandmould.arrays import Flags, Floats
 from sandmould.casting.mps.flow import Flow, FlowGuard
-from sandmould.casting.mps.particles import FLUID, WALL_LAYERS, at_rest, lattice, mould_around
+from sandmould.casting.mps.particles import (
+    FLUID,
+    WALL_LAYERS,
+    at_rest,
+    lattice,
+    make_kernel,
+    mould_around,
+)
 from sandmould.casting.mps.scheme import LiquidMetal, Scheme
-from sandmould.casting.mps.weight import make_kernel
 
 RATE_KG_S = 0.1
 FREEBOARD = 10
