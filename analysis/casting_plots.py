@@ -165,7 +165,6 @@ def _cut(fields: Mapping[str, Array], freezing: Freezing) -> tuple[dict[str, Arr
 
 
 def _flat(place_m: Array, axis: int) -> Array:
-    """Places without one of three coordinates."""
     return np.delete(place_m, axis, axis=1) if place_m.shape[1] == 3 else place_m
 
 

@@ -11,9 +11,8 @@ from numpy.typing import NDArray
 from scipy.ndimage import distance_transform_edt, label
 from scipy.spatial import cKDTree
 
-from sandmould.analysis.free_space import part_in_solid, polygon_below_m2
+from sandmould.analysis.free_space import mesh_below_m3, part_in_solid, polygon_below_m2
 from sandmould.analysis.intersections import disc_segment_m2, sphere_cap_m3
-from sandmould.analysis.mesh_parts import mesh_below_m3
 from sandmould.arrays import Centres, Radii
 from sandmould.geometry.geometry import Array, Block, Cavity, Scene, distance_within
 from sandmould.geometry.mesh import TriangleMesh

@@ -118,7 +118,6 @@ def _is_clear(c: Any, pressed: Ints, moved: Floats) -> bool:
 
 @njit(**OPTIONS)
 def _measure(c: Any, pressed: Ints, moved: Floats) -> None:
-    """Take up the distances from the obstacles."""
     count = len(c.drawn)
     for v in range(count):
         x, y = moved[pressed[2 * v]], moved[pressed[2 * v + 1]]

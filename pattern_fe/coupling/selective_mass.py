@@ -101,7 +101,6 @@ def selective_mass(
 
 
 def _first(square_1_s2: Array) -> float:
-    """Least square of an angular frequency above 0."""
     return float(square_1_s2[square_1_s2 > 0.0].min())
 
 

@@ -54,7 +54,6 @@ def _flat_normal(dim: Any, vertices: Floats, corner: Ints) -> Any:
 
 @njit(**OPTIONS)
 def _span(vertices: Floats, corner: Ints, k: int) -> tuple[float, float]:
-    """Smallest and largest of a coordinate of a facet."""
     low, high = math.inf, -math.inf
     for j in range(len(corner)):
         low, high = min(low, vertices[corner[j], k]), max(high, vertices[corner[j], k])
@@ -193,7 +192,6 @@ def _longer(array: Places, filled: int) -> Places:
 
 @njit(**OPTIONS)
 def _sort_row(parts: Places, first: int, last: int) -> None:
-    """Put a few parts into increasing order."""
     for k in range(first + 1, last):
         part, q = parts[k], k
         while q > first and parts[q - 1] > part:
@@ -219,7 +217,6 @@ def candidates_in(
 
     Parameters
     ----------
-    dim : tuple of d floats
     position : (n, d or 3) float64, m
     radius : (n,) float64, m
     skin : float, m

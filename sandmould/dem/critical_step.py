@@ -87,7 +87,6 @@ class _Ends(NamedTuple):
 
 
 def _pair_ends(solver: Solver) -> _Ends:
-    """Contacts between grains."""
     grains, contacts = solver.grains, solver.contacts
     i, j = contacts.first, contacts.second
     apart = grains.position[j] - grains.position[i]

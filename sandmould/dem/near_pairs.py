@@ -283,7 +283,6 @@ def look(dim: Any, c: int, bound: Ints, grains: Grains, pairs: Pairs, near: Near
 
     Parameters
     ----------
-    dim : tuple of d floats
     c : int
         The chunk.
     bound : (c + 1,) int64
@@ -356,7 +355,6 @@ def new_near_pairs(
 
     Parameters
     ----------
-    dim : tuple of d floats
     bound : (c + 1,) int64
         First grains of the chunks.
     grains : Grains

@@ -126,7 +126,6 @@ def nearest(
 
     Parameters
     ----------
-    dim : tuple of d floats
     vertices, planes, shape, corner
         Of the ``SurfaceArrays``: a tuple of arrays costs more than its arrays.
     x : tuple of d floats, m

@@ -154,7 +154,6 @@ class TableSolver(Solver):
         return place
 
     def _run(self, steps: int, drifted: bool, displacement_m: Floats) -> tuple[int, int]:
-        """Let all threads run the step loop together."""
         if self._table is None:
             return super()._run(steps, drifted, displacement_m)
         table, whole = self._table

@@ -105,7 +105,6 @@ def carry_history(
 
     Parameters
     ----------
-    dim : tuple of d floats
     old_ids, new_ids : (m,) integers
         Which grain, by an identity that outlives sorting, each row stands for; not negative.
     old : WallHistory

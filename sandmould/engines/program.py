@@ -202,7 +202,6 @@ def _flow(scenario: Scenario, discharge: Discharge) -> Iterator[Stage]:
 
 
 def _pours(scenario: Scenario, counts: list[int]) -> Iterator[Stage]:
-    """Stages of the fill."""
     vibration, between = scenario.fill.vibration, scenario.fill.vibration_between_layers
     if vibration is not None:
         yield from _vibrated_pours(scenario, vibration, len(counts))

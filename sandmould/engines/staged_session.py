@@ -134,7 +134,6 @@ class StagedSession(ABC):
         return value
 
     def _stage_steps(self) -> int:
-        """Steps of the stage, at most."""
         return self.stage.longest_steps(self._counts)
 
     def start_stage(self, stage: Stage) -> None:
@@ -201,7 +200,6 @@ class StagedSession(ABC):
         self.at_rest = long_enough and self._watch.at_rest
 
     def _weight_n(self) -> float:
-        """Weight of all grains now in the box."""
         layers = bisect.bisect_right(list(accumulate(self._program.counts)), self.grains)
         return self._program.mass_kg(layers) * self._scenario.gravity_m_s2
 

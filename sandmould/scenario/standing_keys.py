@@ -45,7 +45,6 @@ def standing_lengths(model: type[BaseModel], tree: Any, parts: list[str]) -> lis
 
 
 def _standing(model: type[BaseModel], tree: Any, parts: list[str]) -> list[type[BaseModel]]:
-    """Models that can stand at a path of a tree."""
     here: list[Any] = [model]
     for part in parts:
         here = [inner for outer in here for inner in _below(outer, part)]
@@ -85,7 +84,6 @@ def _value(tree: Any, part: str) -> Any:
 
 
 def _takes(model: Any, kind: Any) -> bool:
-    """Whether a model is the one of a kind."""
     field = getattr(model, "model_fields", {}).get("kind")
     return field is not None and kind in get_args(field.annotation)
 

@@ -41,7 +41,6 @@ class _Bounded(yaml.SafeLoader):
         self._depth = self._aliases = 0
 
     def compose_node(self, parent: Any, index: Any) -> yaml.Node | None:
-        """Compose a node and count it."""
         if self.check_event(yaml.AliasEvent):
             self._aliases += 1
             YAML_ALIASES.check("file", self._aliases)

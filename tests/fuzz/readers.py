@@ -92,7 +92,7 @@ def _grains(path: Path) -> object:
 
 
 def _stress(path: Path) -> object:
-    from sandmould.engines.liggghts.bending_mesh import read_triangle_loads
+    from sandmould.engines.liggghts.session import read_triangle_loads
 
     return read_triangle_loads(path)
 

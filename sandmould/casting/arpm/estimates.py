@@ -96,7 +96,6 @@ def _surface_m2(raster: Raster, mask: Flags) -> Floats:
 
 
 def _away2(place: Any, centre: Ints) -> Any:
-    """Squared distances of cells from one of them."""
     return sum((line - at) ** 2 for line, at in zip(place, centre, strict=True))
 
 

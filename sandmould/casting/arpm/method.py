@@ -17,14 +17,18 @@ from scipy.spatial import ConvexHull
 from sandmould.arrays import Floats, Ints
 from sandmould.casting.arpm.difference import DifferenceSteps
 from sandmould.casting.arpm.elements import Elements
-from sandmould.casting.arpm.exchange import Exchange, resistances
-from sandmould.casting.arpm.faces import face_exchange, over_faces
+from sandmould.casting.arpm.exchange import Exchange, face_exchange, over_faces, resistances
 from sandmould.casting.arpm.filling import Filling
 from sandmould.casting.arpm.kernel import kernel_exchange, with_images
 from sandmould.casting.arpm.local_steps import LocalSteps
-from sandmould.casting.arpm.marching import STEP_SHARE, ExplicitSteps, Marching, Substance
+from sandmould.casting.arpm.marching import (
+    STEP_SHARE,
+    ExplicitSteps,
+    Marching,
+    Substance,
+    SuperSteps,
+)
 from sandmould.casting.arpm.raster import Raster
-from sandmould.casting.arpm.super_steps import SuperSteps
 
 Exchanging = Literal["printed", "corrected", "symmetric", "faces", "power", "difference"]
 Stepping = Literal["explicit", "super", "local"]

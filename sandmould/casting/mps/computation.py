@@ -163,7 +163,6 @@ def _outcome(stop: ArithmeticError) -> Outcome:
 
 
 def _count(cost: FlowCost, course: _Course) -> None:
-    """Take over what the flow has counted."""
     flow, spent = course.flow, course.flow.cost
     cost.particles, cost.steps = int(flow.fluid.sum()), spent.steps
     cost.particle_solves, cost.poisson_iterations = spent.particle_solves, spent.iterations

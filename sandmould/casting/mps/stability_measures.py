@@ -144,7 +144,6 @@ def _history(table: pd.DataFrame, names: Sequence[str]) -> History:
 
 
 def _later(past: History, from_s: float) -> History:
-    """Steps that end after a time."""
     later = past.time_s > from_s
     return History(*(getattr(past, name)[later] for name in History.__dataclass_fields__))
 

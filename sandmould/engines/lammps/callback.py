@@ -107,7 +107,6 @@ def _must_list(
 
 @njit(**OPTIONS)
 def _copy(source: WholeNumbers, target: Ints) -> None:
-    """Copy an array to the front of a longer one."""
     for i in range(len(source)):
         target[i] = source[i]
 

@@ -53,7 +53,7 @@ def communicator() -> None:
 
 def session_sources(scenario: Scenario) -> list[list[Path]]:
     """The session and the files that pass between it and the engine."""
-    names = ("session.py", "process.py", "mesh_files.py", "bending_mesh.py")
+    names = ("session.py", "process.py", "mesh_files.py")
     session = [Path(__file__).with_name(name) for name in names]
     return [session, *sources_of_step(scenario)]
 

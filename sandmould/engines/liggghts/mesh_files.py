@@ -97,7 +97,6 @@ def outline_strips(outline_m: Array, span_m: tuple[float, float]) -> Array:
 
 
 def _cuboid(block: Block) -> Array:
-    """The six faces of a block."""
     edges = 2 * block.half_size_m[:, None] * block.axes
     faces = []
     for i in range(3):

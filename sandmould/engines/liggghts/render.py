@@ -55,7 +55,6 @@ def render_deck(
 
 
 def _own_context(program: Program, lines: Lines) -> dict[str, Any]:
-    """What only the templates of LIGGGHTS are given."""
     scenario = program.scenario
     gate = scenario.discharge is not None
     return {

@@ -260,7 +260,6 @@ class ReferenceSession(StagedSession):
         return before, now, ahead
 
     def _box_motion(self) -> tuple[Array, Array]:
-        """Displacement and velocity of the walls in the frame of the computation."""
         if self._motion is None or self._scenario.frame == "box":
             return super()._box_motion()
         before, now, ahead = self._places_m()

@@ -35,7 +35,7 @@ from sandmould.scenario.solids import READ_BYTES, SolidMesh, drawn_part, drawn_s
 MEASURING = (
     *(f"sandmould/analysis/{name}.py" for name in (
         "cavity_fill", "coordination", "deflection", "density", "free_space", "intersections",
-        "loose_zones", "mesh_parts", "repose", "sections", "solid_fraction", "tube_fill",
+        "loose_zones", "repose", "sections", "solid_fraction", "tube_fill",
     )),
     *(f"sandmould/kinds/sand/{name}.py" for name in (
         "bending", "measure", "moments", "outflow",
