@@ -43,12 +43,8 @@ def contacts(
     rattler and left out of ``mean_coordination_bearing``. The test is made once, so a grain held
     only by rattlers still counts as bearing. A solid counts once, also for a grain in its notch.
 
-    Parameters
-    ----------
-    scene : Scene, optional
-        Walls and solids; without it only contacts between grains are counted.
-    tolerance_m : float, m, optional
-        Largest gap that still counts as contact.
+    ``scene``: walls and solids; without it only contacts between grains are counted.
+    ``tolerance_m``: largest gap that still counts as contact.
     """
     n, dimension = position_m.shape
     count = np.zeros(n, dtype=np.int64)

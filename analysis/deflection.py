@@ -29,14 +29,8 @@ class Deflection:
 def farthest_corner(drawn_m: Array, held_m: Array) -> int:
     """Vertex of an outline farthest from what holds it: the tip of the flange of an L.
 
-    Of several the one farthest to the right.
-
-    Parameters
-    ----------
-    drawn_m : (nv, d) float64, m
-        Vertices as drawn.
-    held_m : (k, d) float64, m
-        Points that do not move.
+    Of several the one farthest to the right. ``drawn_m``, (nv, d) float64, m: vertices as drawn.
+    ``held_m``, (k, d) float64, m: points that do not move.
 
     Raises
     ------
@@ -53,12 +47,8 @@ def farthest_corner(drawn_m: Array, held_m: Array) -> int:
 def deflection(drawn_m: Array, now_m: Array, tip: int) -> Deflection:
     """Displacements of an outline; the vertical axis is the last one.
 
-    Parameters
-    ----------
-    drawn_m, now_m : (nv, d) float64, m
-        Vertices as drawn, and where they are.
-    tip : int
-        Vertex of the farthest corner.
+    ``drawn_m``, ``now_m``, (nv, d) float64, m: vertices as drawn, and where they are. ``tip``:
+    vertex of the farthest corner.
     """
     moved_m = now_m - drawn_m
     largest_m = float(np.linalg.norm(moved_m, axis=1).max())

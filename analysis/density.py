@@ -40,14 +40,8 @@ def apparent_density(
     of the bed still read low, for the air above them counts as pores. An overlap of two grains
     counts twice, as in the paper.
 
-    Parameters
-    ----------
-    density_kg_m3 : float, kg/m3
-        Of the grains' own material.
-    scene : Scene, optional
-        Walls and solids; without it nothing is corrected.
-    control_radius_m : float, m, optional
-        Twice the largest radius, as in the paper, unless given.
+    ``density_kg_m3``: of the grains' own material. ``scene``: walls and solids; without it nothing
+    is corrected. ``control_radius_m``: twice the largest radius, as in the paper, unless given.
 
     Raises
     ------

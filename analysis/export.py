@@ -82,9 +82,8 @@ def elements_to_vtk(fields: Mapping[str, Array], path: Path) -> None:
     """Write elements of heat as squares or cubes with their data, for ParaView (.vtu).
 
     Elements that touch share corners. Cells have ``frozen_s``, ``temperature_k`` and ``melts`` (1
-    in the casting).
-
-    ``fields``: arrays ``position_m`` (n, d), ``size_m`` (n,) and those of the cells, (n,).
+    in the casting). ``fields``: arrays ``position_m`` (n, d), ``size_m`` (n,) and those of the
+    cells, (n,).
     """
     position_m, size_m = fields["position_m"], fields["size_m"]
     dimensions = position_m.shape[1]

@@ -101,10 +101,7 @@ def feeding(fields: Mapping[str, Any]) -> Feeding | None:
 def owner_grid(position_m: Array, size_m: Array) -> tuple[Ints, Array]:
     """Number of the element that covers each cell of the smallest size, -1 for none.
 
-    Parameters
-    ----------
-    position_m : (n, d) float64, m
-    size_m : (n,) float64, m
+    ``position_m``: (n, d) float64, m; ``size_m``: (n,) float64, m.
 
     Returns
     -------
@@ -206,11 +203,8 @@ def _basins(end_s: Array, first: Ints, second: Ints) -> tuple[Ints, Ints]:
 def _partings(
     end_s: Array, first: Ints, second: Ints, basin: Ints, peak: Ints, feeds: NDArray[np.bool_]
 ) -> Iterator[tuple[list[int], float, tuple[int, int] | None]]:
-    """Basins that part from what feeds them, when, and the two elements between them.
-
-    Backwards in time liquid grows together, and with a source in each element that feeds. What
-    meets the source late has been cut off from there on.
-    """
+    """Basins that part from what feeds them, when, and the two elements between them."""
+    # Backwards in time liquid grows together; what meets a source late was cut off from there on.
     source, fed = len(peak), np.flatnonzero(feeds)
     pairs = np.hstack([[first, second], [fed, fed]])
     one, other = (

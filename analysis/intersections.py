@@ -15,36 +15,22 @@ _TINY_M = 1e-150
 
 
 def disc_segment_m2(distance_m: Array, radius_m: Array) -> Array:
-    """Area of a disc beyond a straight line.
+    """Area of a disc beyond a straight line, (n,) float64, m2.
 
-    Parameters
-    ----------
-    distance_m : (n,) float64, m
-        From the disc's centre to the line, negative when the centre lies beyond it.
-    radius_m : (n,) float64, m
-
-    Returns
-    -------
-    (n,) float64, m2
-        ``r^2 arccos(x/r) - x sqrt(r^2 - x^2)``; 0 or the whole disc when the line misses it.
+    ``r^2 arccos(x/r) - x sqrt(r^2 - x^2)``; 0 or the whole disc when the line misses it.
+    ``distance_m``, (n,) float64, m: from the disc's centre to the line, negative when the centre
+    lies beyond it. ``radius_m``: (n,) float64, m.
     """
     x = np.clip(distance_m, -radius_m, radius_m)
     return radius_m**2 * np.arccos(x / radius_m) - x * np.sqrt(radius_m**2 - x**2)
 
 
 def sphere_cap_m3(distance_m: Array, radius_m: Array) -> Array:
-    """Volume of a sphere beyond a plane.
+    """Volume of a sphere beyond a plane, (n,) float64, m3.
 
-    Parameters
-    ----------
-    distance_m : (n,) float64, m
-        From the sphere's centre to the plane, negative when the centre lies beyond it.
-    radius_m : (n,) float64, m
-
-    Returns
-    -------
-    (n,) float64, m3
-        ``pi/3 (r - x)^2 (2 r + x)``; 0 or the whole sphere when the plane misses it.
+    ``pi/3 (r - x)^2 (2 r + x)``; 0 or the whole sphere when the plane misses it. ``distance_m``,
+    (n,) float64, m: from the sphere's centre to the plane, negative when the centre lies beyond it.
+    ``radius_m``: (n,) float64, m.
     """
     x = np.clip(distance_m, -radius_m, radius_m)
     return np.pi / 3.0 * (radius_m - x) ** 2 * (2.0 * radius_m + x)
@@ -54,13 +40,8 @@ def disc_lens_m2(distance_m: Array, first_radius_m: Array, second_radius_m: Arra
     """Area common to two discs, also when apart or one inside the other, (n,) float64, m2.
 
     The line of equal power cuts both discs along their common chord, so the lens is a segment of
-    each.
-
-    Parameters
-    ----------
-    distance_m : (n,) float64, m
-        Between the centres.
-    first_radius_m, second_radius_m : (n,) float64, m
+    each. ``distance_m``, (n,) float64, m: between the centres. ``first_radius_m``,
+    ``second_radius_m``: (n,) float64, m.
     """
     first, second = _to_common_chord(distance_m, first_radius_m, second_radius_m)
     return disc_segment_m2(first, first_radius_m) + disc_segment_m2(second, second_radius_m)
@@ -69,11 +50,8 @@ def disc_lens_m2(distance_m: Array, first_radius_m: Array, second_radius_m: Arra
 def sphere_lens_m3(distance_m: Array, first_radius_m: Array, second_radius_m: Array) -> Array:
     """Volume common to two spheres, also when apart or one inside the other, (n,) float64, m3.
 
-    Parameters
-    ----------
-    distance_m : (n,) float64, m
-        Between the centres.
-    first_radius_m, second_radius_m : (n,) float64, m
+    ``distance_m``, (n,) float64, m: between the centres. ``first_radius_m``, ``second_radius_m``:
+    (n,) float64, m.
     """
     first, second = _to_common_chord(distance_m, first_radius_m, second_radius_m)
     return sphere_cap_m3(first, first_radius_m) + sphere_cap_m3(second, second_radius_m)
@@ -101,21 +79,14 @@ def polygon_area_m2(polygon_m: Array) -> float:
 
 
 def cut_polygon(polygon_m: Array, point_m: Array, normal: Array) -> Array:
-    """Part of a polygon on the normal's side of a line.
+    """Part of a polygon on the normal's side of a line, (k', 2) float64, m.
 
     A polygon that is not convex may be left in several pieces: they stay joined along the line by
     edges that run there and back, which bound no area.
 
-    Parameters
-    ----------
-    polygon_m : (k, 2) float64, m
-    point_m, normal : (2,) float64
-        A point of the line, m, and a vector towards the side that stays.
-
-    Returns
-    -------
-    (k', 2) float64, m
-        In the same sense of rotation; empty when nothing is left.
+    In the same sense of rotation; empty when nothing is left. ``polygon_m``: (k, 2) float64, m.
+    ``point_m``, ``normal``, (2,) float64: a point of the line, m, and a vector towards the side
+    that stays.
     """
     if len(polygon_m) == 0:
         return polygon_m
@@ -134,15 +105,8 @@ def cut_polygon(polygon_m: Array, point_m: Array, normal: Array) -> Array:
 def depth_in_polygon_m(point_m: Array, polygon_m: Array) -> Array:
     """Distance of points from the nearest edge line of a convex polygon, positive inside it.
 
-    Parameters
-    ----------
-    point_m : (n, 2) float64, m
-    polygon_m : (k, 2) float64, m
-        In either sense of rotation.
-
-    Returns
-    -------
-    (n,) float64, m
+    Gives (n,) float64, m. ``point_m``: (n, 2) float64, m. ``polygon_m``, (k, 2) float64, m: in
+    either sense of rotation.
     """
     return _inside_m(point_m, *_edges(polygon_m)).min(axis=1)
 

@@ -16,9 +16,9 @@ from numpy.typing import NDArray
 from scipy.ndimage import label
 from scipy.spatial import cKDTree
 
-from sandmould.analysis.bed_density import buried_places
 from sandmould.analysis.free_space import free_part
 from sandmould.analysis.intersections import disc_lens_m2, sphere_lens_m3
+from sandmould.analysis.solid_fraction import buried_places
 from sandmould.analysis.tube_fill import lies_in_bore
 from sandmould.arrays import Centres, Radii
 from sandmould.geometry.geometry import Array, Scene, Solid, Wall, distance_within
@@ -90,14 +90,8 @@ def find_loose_sand(
     """Find the zones of loose sand.
 
     Places are the cells of a grid that lie in free space and at least a ball's radius below the
-    surface of the sand there.
-
-    Parameters
-    ----------
-    scene : Scene
-        Its walls must close the box on every side; in 3D they must be upright or level.
-    grain_m : float, m
-        Diameter of the mass-median grain.
+    surface of the sand there. ``scene``: its walls must close the box on every side; in 3D they
+    must be upright or level. ``grain_m``: diameter of the mass-median grain.
     """
     ball_m, cell_m = 0.5 * BALL_GRAINS * grain_m, grain_m / CELLS_A_GRAIN
     grid, is_buried = buried_places(position_m, radius_m, ball_m, cell_m)
@@ -171,10 +165,8 @@ def _usual_fraction(local: Array, clear_m: Array, ball_m: float, cell_m: float) 
 
 
 def _sides(from_solid_m: Array, near_m: float) -> NDArray[np.int8]:
-    """On which side of the solids each place lies, as a number into ``SIDES``.
-
-    A place between two solids, one over the other, counts as under the upper one.
-    """
+    """On which side of the solids each place lies, as a number into ``SIDES``."""
+    # A place between two solids, one over the other, counts as under the upper one.
     inside = from_solid_m <= 0.0
     up = np.logical_or.accumulate(inside[..., ::-1], axis=-1)[..., ::-1]
     down = np.logical_or.accumulate(inside, axis=-1)
@@ -193,10 +185,8 @@ def _zones(
     grain_m: float,
     scene: Scene,
 ) -> tuple[tuple[LooseZone, ...], NDArray[np.int32]]:
-    """Zones at least as large as a grain, the largest first, and each place's number of its zone.
-
-    ``local`` is 0 where no place is.
-    """
+    """Zones at least as large as a grain, the largest first, and the zone of each place."""
+    # local is 0 where no place is
     dimension, cell_m = grid.shape[-1], grain_m / CELLS_A_GRAIN
     number, _ = label(loose)
     cell = cell_m**dimension

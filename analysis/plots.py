@@ -189,7 +189,6 @@ def _frame(ax: Axes, dimension: int, points_m: Array) -> None:
 
 
 def _middle(scene: Scene) -> float:
-    """Middle of a 3D box along y, m; of no meaning in 2D."""
     if scene.dimension == 2:
         return 0.0
     y = box_section(scene)[:, 1]

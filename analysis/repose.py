@@ -94,18 +94,9 @@ def free_surface(
 ) -> Surface:
     """Find the upper envelope of grains over a part of the floor.
 
-    Parameters
-    ----------
-    low_m, high_m : (d - 1,) float64, m
-        Bounds of the part.
-    floor_m : float, m
-        Heights count from it; grains below it are left out.
-
-    Returns
-    -------
-    Surface
-        On cells about a mean diameter wide, each as high as the highest place in it: between
-        grains one would see deep into the sand.
+    On cells about a mean diameter wide, each as high as the highest place in it: between grains one
+    would see deep into the sand. ``low_m``, ``high_m``, (d - 1,) float64, m: bounds of the part.
+    ``floor_m``: heights count from it; grains below it are left out.
     """
     if not len(radius_m):
         return Surface(0.5 * (low_m + high_m)[None], np.zeros(1))
@@ -133,16 +124,9 @@ def free_surface(
 def profiles(surface: Surface, width_m: float, axis_m: Array) -> dict[str, tuple[Array, Array]]:
     """Profiles outwards from an axis: left and right in 2D, one a sector in 3D.
 
-    Parameters
-    ----------
-    width_m : float, m
-        Of the columns or rings that the surface is averaged over: about one of the largest grains.
-    axis_m : (d - 1,) float64, m
-
-    Returns
-    -------
-    dict of name to (distance_m, height_m)
-        Each (k,) float64, m, in order of the distance.
+    Gives (distance_m, height_m) by name, each (k,) float64, m, in order of the distance.
+    ``width_m``: of the columns or rings that the surface is averaged over: about one of the largest
+    grains. ``axis_m``: (d - 1,) float64, m.
     """
     apart = surface.point_m - axis_m
     distance = np.sqrt((apart**2).sum(axis=1))
@@ -170,13 +154,9 @@ def fit_flank(name: str, distance_m: Array, height_m: Array, foot: float = FOOT)
     """Fit a line to a slope that rises along the given points.
 
     The slope is the median of those of all pairs of points (Theil 1950, Sen 1968), so that a few
-    grains on the surface do not turn it.
-
-    Parameters
-    ----------
-    distance_m, height_m : (k,) float64, m
-        Profile from foot to crest; only heights between ``foot`` and ``CREST`` of its largest,
-        from the last point below that range on, are fitted.
+    grains on the surface do not turn it. ``distance_m``, ``height_m``, (k,) float64, m: profile
+    from foot to crest; only heights between ``foot`` and ``CREST`` of its largest, from the last
+    point below that range on, are fitted.
     """
     crest_m = float(height_m.max(initial=0.0))
     top = int(np.argmax(height_m >= CREST * crest_m)) if len(height_m) else 0
@@ -198,10 +178,7 @@ def fit_flank(name: str, distance_m: Array, height_m: Array, foot: float = FOOT)
 
 
 def _slope_error(x: Array, residual: Array) -> float:
-    """Standard error of a slope whose residuals are correlated from point to point.
-
-    A first-order autoregression with coefficient c has n (1 - c) / (1 + c) free points among n.
-    """
+    """Standard error of a slope; residuals of correlation c leave n (1 - c)/(1 + c) free points."""
     n = len(x)
     residual = residual - residual.mean()
     variance = float((residual**2).sum())
@@ -235,12 +212,8 @@ def residue_slope(surface: Surface, width_m: float, axis_m: Array) -> Slope:
 def walls_touched(surface: Surface, low_m: Array, high_m: Array, depth_m: float) -> list[str]:
     """Names of the box walls that a heap leans on: sand beside them deeper than a depth.
 
-    Parameters
-    ----------
-    low_m, high_m : (d - 1,) float64, m
-        Where the walls are.
-    depth_m : float, m
-        Single grains that rolled there are no heap: about one and a half of the largest.
+    ``low_m``, ``high_m``, (d - 1,) float64, m: where the walls are. ``depth_m``: single grains that
+    rolled there are no heap: about one and a half of the largest.
     """
     names = (("left", "right"), ("front", "back"))
     deep = surface.height_m > depth_m
@@ -253,7 +226,9 @@ def walls_touched(surface: Surface, low_m: Array, high_m: Array, depth_m: float)
 
 
 def connected(surface: Surface, depth_m: float, start: NDArray[np.bool_]) -> NDArray[np.bool_]:
-    """Which points of a surface belong to one deep heap with some of them.
+    """Which points of a surface belong to one deep heap with some of them, (m,) bool.
+
+    Deep points that deep neighbours, over gaps of two cells at most, join to a start.
 
     Parameters
     ----------
@@ -263,11 +238,6 @@ def connected(surface: Surface, depth_m: float, start: NDArray[np.bool_]) -> NDA
         Sand deeper than this is a heap.
     start : (m,) bool
         Points where the heap begins; only deep ones count.
-
-    Returns
-    -------
-    (m,) bool
-        Deep points that deep neighbours, over gaps of two cells at most, join to a start.
     """
     from scipy.ndimage import binary_closing, label
 

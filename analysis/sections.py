@@ -10,14 +10,11 @@ from sandmould.geometry.outline import Outline, signed_area_m2
 
 
 def solid_sections(solid: Solid, cut_m: float) -> list[Array]:
-    """Polygons in which the plane shown cuts a solid.
+    """Polygons in which the plane shown cuts a solid, (k, 2) float64, m.
 
     ``cut_m``, float, m: in 3D, y of the plane of x and z; of no meaning in 2D.
 
-    Returns
-    -------
-    list of (k, 2) float64, m
-        A hole is joined to the polygon round it by an edge there and back.
+    A hole is joined to the polygon round it by an edge there and back.
     """
     if isinstance(solid, Outline):
         return [solid.vertices_m]
@@ -29,14 +26,11 @@ def solid_sections(solid: Solid, cut_m: float) -> list[Array]:
 
 
 def convex_section(corners_m: Array, cut_m: float) -> Array:
-    """Polygon in which the plane shown cuts a convex body.
+    """Polygon in which the plane shown cuts a convex body, (k, 2) float64, m.
 
     ``corners_m``: (m, d) float64, m.
 
-    Returns
-    -------
-    (k, 2) float64, m
-        Empty where the plane misses the body.
+    Empty where the plane misses the body.
     """
     points_m = corners_m
     if corners_m.shape[1] == 3:

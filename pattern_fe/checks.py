@@ -49,7 +49,7 @@ def check_mesh(mesh: Any) -> None:
 
 
 def check_inside(place_m: Array, low_m: Array, high_m: Array, hint: str = "") -> None:
-    """Refuse a pattern that reaches out of a box.
+    """Refuse a pattern that reaches out of a box (ValueError).
 
     Parameters
     ----------
@@ -59,10 +59,6 @@ def check_inside(place_m: Array, low_m: Array, high_m: Array, hint: str = "") ->
         Corners of the box; a pattern may touch its walls.
     hint : str, optional
         What else to say of one outside.
-
-    Raises
-    ------
-    ValueError
     """
     least, most = place_m.min(axis=0), place_m.max(axis=0)
     # seven digits of an STL file may put a face on a wall out of it
@@ -80,11 +76,8 @@ def place(point_m: Iterable[float]) -> str:
 
 
 def _inverted(mesh: Any) -> NDArray[np.bool_]:
-    """Elements folded in themselves or over their neighbours, (ne,) bool.
-
-    The order of an element's corners may run either way, in a file as in scikit-fem; so those
-    that are turned inside out are known by lying on the same side of a shared face as others.
-    """
+    """Elements folded in themselves or over their neighbours, (ne,) bool."""
+    # Corners may run either way: elements inside out lie on one side of a shared face.
     # not the mesh's own mapping, which inverts that of simplices at once
     mapping, axes = MappingIsoparametric(mesh, mesh.elem()), range(mesh.dim())
     edges = np.array([[mapping.J(i, j, mesh.refdom.p) for j in axes] for i in axes])

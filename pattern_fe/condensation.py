@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 from scipy.linalg import eigh
 from scipy.sparse import csc_array, csr_array
 
-from sandmould.pattern_fe.factor import factorised
+from sandmould.pattern_fe.space import factorised
 from sandmould.pattern_fe.supports import Mask
 
 Array = NDArray[np.float64]
@@ -63,6 +63,8 @@ def condensed_surface(
 ) -> CondensedSurface:
     """Schur complement on the nodes of a surface, exact for static loads on it (Guyan 1965).
 
+    Memory for the square of its components is needed a few times over.
+
     Parameters
     ----------
     stiffness : (N d, N d) sparse float64, N/m
@@ -74,11 +76,6 @@ def condensed_surface(
     fixed : (N, d) bool
     loose : int, optional
         Rigid motions that nothing holds.
-
-    Returns
-    -------
-    CondensedSurface
-        Memory for the square of its components is needed a few times over.
     """
     d, nodes = fixed.shape[1], np.unique(motion.indices)
     retained = (nodes[:, None] * d + np.arange(d)).ravel()

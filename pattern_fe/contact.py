@@ -151,12 +151,8 @@ def _deepest(gaps: Gaps, open_m: Array, least_m: float) -> Indices:
 def reactions_n(compliance_m_n: Array, open_m: Array) -> Array:
     """Solve r >= 0, w = C r + g >= 0, r w = 0, (m,) float64, N.
 
-    Parameters
-    ----------
-    compliance_m_n : (m, m) float64, m/N
-        C, symmetric and positive; rows of places that cannot move are 0 and get no reaction.
-    open_m : (m,) float64, m
-        g, gaps without reactions.
+    ``compliance_m_n``, (m, m) float64, m/N: C, symmetric and positive; rows of places that cannot
+    move are 0 and get no reaction. ``open_m``, (m,) float64, m: g, gaps without reactions.
 
     Raises
     ------

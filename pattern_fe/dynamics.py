@@ -41,14 +41,8 @@ def natural_frequencies_hz(
 ) -> Array:
     """Lowest natural frequencies, ascending; those of rigid motions are near 0.
 
-    Parameters
-    ----------
-    stiffness, mass : (n d, n d) sparse float64, N/m and kg
-    fixed : (n, d) bool
-
-    Returns
-    -------
-    (count,) float64, Hz
+    Gives (count,) float64, Hz. ``stiffness``, ``mass``: (n d, n d) sparse float64, N/m and kg;
+    ``fixed``: (n, d) bool.
 
     Raises
     ------

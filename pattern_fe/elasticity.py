@@ -20,9 +20,7 @@ Array = NDArray[np.float64]
 def displacement_gradient(space: Space, displacement_m: Array) -> Array:
     """Grad u at the integration points; F = 1 + grad u, (ne, q, d, d) float64.
 
-    Parameters
-    ----------
-    displacement_m : (n, d) float64, m
+    ``displacement_m``: (n, d) float64, m.
     """
     moved = displacement_m[space.cells].transpose(0, 2, 1)[:, None]
     return np.asarray(moved @ space.gradient)
@@ -41,9 +39,7 @@ def green_strain(slope: Array) -> Array:
 def internal_force_n(space: Space, foam: Foam, displacement_m: Array) -> Array:
     """Forces with which the nodes must be held in a deformed state, (n, d) float64, N.
 
-    Parameters
-    ----------
-    displacement_m : (n, d) float64, m
+    ``displacement_m``: (n, d) float64, m.
     """
     moved = np.ascontiguousarray(displacement_m, dtype=np.float64)
     lam, mu = foam.lame_pa
@@ -53,10 +49,7 @@ def internal_force_n(space: Space, foam: Foam, displacement_m: Array) -> Array:
 def element_tangent_n_m(space: Space, foam: Foam, displacement_m: Array) -> Array:
     """Change of the elements' forces with their displacements, (ne, k d, k d) float64, N/m.
 
-    Parameters
-    ----------
-    displacement_m : (n, d) float64, m
-        State about which they change.
+    ``displacement_m``, (n, d) float64, m: state about which they change.
     """
     lam, mu = foam.lame_pa
     ne, _, k, d = space.gradient.shape
@@ -86,13 +79,7 @@ def element_tangent_n_m(space: Space, foam: Foam, displacement_m: Array) -> Arra
 def von_mises_pa(foam: Foam, stress_pa: Array) -> Array:
     """Equivalent stress; in 2D with the stress that plane strain builds up across the plane.
 
-    Parameters
-    ----------
-    stress_pa : (..., d, d) float64, Pa
-
-    Returns
-    -------
-    (...) float64, Pa
+    Gives (...) float64, Pa. ``stress_pa``: (..., d, d) float64, Pa.
     """
     trace = np.trace(stress_pa, axis1=-2, axis2=-1)
     across = foam.poisson * trace if stress_pa.shape[-1] == 2 else 0.0

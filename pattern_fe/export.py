@@ -11,9 +11,8 @@ from numpy.typing import NDArray
 from skfem import MeshQuad
 from skfem.io.meshio import to_meshio
 
-from sandmould.pattern_fe.distance import distance_from_drawing
 from sandmould.pattern_fe.loads import vertex_pressure_pa
-from sandmould.pattern_fe.perimeter import Perimeter
+from sandmould.pattern_fe.perimeter import Perimeter, distance_from_drawing
 from sandmould.pattern_fe.space import Space
 
 Array = NDArray[np.float64]
@@ -27,13 +26,8 @@ def write_surface(
 
     Points lie where the vertices are, each with its displacement and its distance from the drawing,
     positive outside it; with loads also these and the pressure (56), per area as drawn.
-
-    Parameters
-    ----------
-    perimeter : Perimeter
-        As drawn.
-    displacement_m, load_n : (nv, d) float64, m and N
-        Of the vertices.
+    ``perimeter``: as drawn. ``displacement_m``, ``load_n``, (nv, d) float64, m and N: of the
+    vertices.
     """
     kind = "line" if perimeter.facets.shape[1] == 2 else "triangle"
     moved = perimeter.moved(displacement_m)
@@ -54,11 +48,8 @@ def write_solid(
 ) -> None:
     """Write the deformed solid for ParaView (.vtu), sides of elements straight.
 
-    Parameters
-    ----------
-    displacement_m : (n, d) float64, m
-        Of all nodes.
-    of_elements : mapping of name to (ne,) float64
+    ``displacement_m``, (n, d) float64, m: of all nodes. ``of_elements``: mapping of name to
+    (ne,) float64.
     """
     mesh = space.mesh
     corners_m = displacement_m[: mesh.nvertices]
@@ -72,12 +63,7 @@ def write_solid(
 def write_stl(path: Path, space: Space, perimeter: Perimeter, displacement_m: Array) -> None:
     """Write the deformed surface as STL; a 2D pattern becomes a plate of its thickness.
 
-    Parameters
-    ----------
-    perimeter : Perimeter
-        As drawn.
-    displacement_m : (n, d) float64, m
-        Of all nodes of the pattern.
+    ``perimeter``: as drawn. ``displacement_m``, (n, d) float64, m: of all nodes of the pattern.
     """
     moved = perimeter.moved(perimeter.motion @ displacement_m)
     if space.dimension == 3:

@@ -14,9 +14,8 @@ from sandmould.pattern_fe.elasticity import (
     element_tangent_n_m,
     internal_force_n,
 )
-from sandmould.pattern_fe.factor import factorised
 from sandmould.pattern_fe.material import Foam
-from sandmould.pattern_fe.space import Space
+from sandmould.pattern_fe.space import Space, factorised
 from sandmould.pattern_fe.supports import Mask
 from sandmould.pattern_fe.surroundings import Surroundings
 
@@ -151,12 +150,9 @@ class _Equilibrium:
         return pressed.reshape(residual_n.shape)
 
     def _searched(self, displacement_m: Array, step_m: Array) -> Array | None:
-        """Halve a step until it turns no element inside out, where the law has false equilibria.
-
-        Nothing more is asked of it. Bending stretches elements at first and takes that back in
-        the next step: a search for less residual work along the step took three to eight times
-        as many steps to the elastica, and went no farther.
-        """
+        """Halve a step until it turns no element inside out, where the law has false equilibria."""
+        # A search for less residual work took three to eight times as many steps to the elastica:
+        # bending stretches elements at first and takes that back in the next step.
         for halvings in range(_HALVINGS):
             tried = displacement_m + step_m / 2**halvings
             slope = displacement_gradient(self.space, tried)

@@ -15,12 +15,9 @@ _FACING = 0.5
 def vertex_pressure_pa(perimeter: Perimeter, load_n: Array) -> Array:
     """Pressure whose force on a vertex has the load's part along its normal, (nv,) float64, Pa.
 
-    On flat parts it is the normal part of (56), positive in compression; at a corner it is that
-    of a uniform pressure, where (56) has too small a value: the vertex's areas face two ways.
-
-    Parameters
-    ----------
-    load_n : (nv, d) float64, N
+    On flat parts it is the normal part of (56), positive in compression; at a corner it is that of
+    a uniform pressure, where (56) has too small a value: the vertex's areas face two ways.
+    ``load_n``: (nv, d) float64, N.
     """
     area = perimeter.vertex_area_vector_m2
     return np.asarray(-np.sum(load_n * area, axis=1) / np.sum(area**2, axis=1))
@@ -34,6 +31,8 @@ def pressure_above_and_below_pa(
     Over a flange the first may be more than the weight of the sand above it, where the bed beside
     it settles and hangs on that sand; the second is what sand under it gives back.
 
+    Pa, positive in compression; NaN where nothing faces that way.
+
     Parameters
     ----------
     perimeter : Perimeter
@@ -41,11 +40,6 @@ def pressure_above_and_below_pa(
     load_n : (nv, d) float64, N
     free : (nv,) bool
         Vertices that nothing holds; sand presses on no other.
-
-    Returns
-    -------
-    (float, float)
-        Pa, positive in compression; NaN where nothing faces that way.
     """
     area = perimeter.vertex_area_vector_m2
     along = area[:, -1] / np.linalg.norm(area, axis=1)

@@ -45,14 +45,8 @@ class Foam:
     def stress_pa(self, strain: Array) -> Array:
         """Hooke's law in 3D or plane strain, for Green strains that of St. Venant and Kirchhoff.
 
-        Parameters
-        ----------
-        strain : (..., d, d) float64
-
-        Returns
-        -------
-        (..., d, d) float64, Pa
-            In plane strain the stress across the plane is not among them.
+        Gives (..., d, d) float64, Pa; in plane strain the stress across the plane is not among
+        them. ``strain``: (..., d, d) float64.
         """
         lam, mu = self.lame_pa
         volume = np.trace(strain, axis1=-2, axis2=-1)[..., None, None]

@@ -33,10 +33,7 @@ def read_mesh(path: Path, unit_m: float = 1.0) -> Any:
     ``shapes.SIDES`` unless a group has that name. Mid-side nodes are dropped: edges are straight;
     groups of faces that have such nodes are not found.
 
-    Parameters
-    ----------
-    unit_m : float, m
-        Length of the file's unit, 0.001 for millimetres.
+    ``unit_m``: length of the file's unit, 0.001 for millimetres.
 
     Raises
     ------
@@ -106,11 +103,8 @@ def _parsed(path: Path) -> meshio.Mesh:
 
 @contextlib.contextmanager
 def _all_saved() -> Iterator[None]:
-    """Let meshio read files of Gmsh 4.1 whose groups do not hold all elements (Mesh.SaveAll).
-
-    It gives the numbers of groups for the elements in groups alone, and then refuses them as too
-    few. Groups are found by their names, so that the numbers can go.
-    """
+    """Let meshio read files of Gmsh 4.1 whose groups do not hold all elements (Mesh.SaveAll)."""
+    # It takes the numbers of groups for too few then. Groups are found by their names.
     given = _gmsh41.Mesh
 
     def fitting(points: Any, cells: Any, *, cell_data: dict[str, Any], **others: Any) -> Any:

@@ -40,10 +40,7 @@ class CentralDifferences:
     def advance(self, load_n: Array) -> None:
         """Go on by one step.
 
-        Parameters
-        ----------
-        load_n : (n, d) float64, N
-            At the start of the step, on nodes displaced as now.
+        ``load_n``, (n, d) float64, N: at the start of the step, on nodes displaced as now.
         """
         force = load_n - self.internal_force_n
         self.velocity_m_s = self._keeps * self.velocity_m_s + self._gains * force

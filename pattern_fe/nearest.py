@@ -13,11 +13,8 @@ _PAIRS = 200_000
 def nearest_on_facets(points_m: Array, corners_m: Array) -> tuple[NDArray[np.int64], Array, Array]:
     """Find the facet nearest each point, and the place on it.
 
-    Parameters
-    ----------
-    points_m : (k, d) float64, m
-    corners_m : (nf, d, d) float64, m
-        Corners of segments in 2D, of triangles in 3D.
+    ``points_m``: (k, d) float64, m. ``corners_m``, (nf, d, d) float64, m: corners of segments in
+    2D, of triangles in 3D.
 
     Returns
     -------

@@ -20,12 +20,11 @@ from sandmould.pattern_fe.elasticity import (
     small_strain,
     von_mises_pa,
 )
-from sandmould.pattern_fe.factor import factorised
 from sandmould.pattern_fe.large_displacement import NewtonSettings, solve_large
 from sandmould.pattern_fe.material import Foam
 from sandmould.pattern_fe.motion import CentralDifferences
 from sandmould.pattern_fe.perimeter import perimeter_of
-from sandmould.pattern_fe.space import space_of
+from sandmould.pattern_fe.space import factorised, space_of
 from sandmould.pattern_fe.supports import Supports, check_held, fixed_components, loose_motions
 from sandmould.pattern_fe.surroundings import Surroundings
 from sandmould.pattern_fe.weak_forms import element_stiffness_n_m
@@ -41,14 +40,9 @@ class Pattern:
     the surface, ``(nv, d)``. ``on_nodes`` for loads and ``on_surface`` for displacements lead from
     one to the other; each is the transpose of the other, see ``perimeter``.
 
-    Parameters
-    ----------
-    mesh : skfem.Mesh
-        From ``shapes`` or ``mesh_file``.
-    order : int
-        Of the elements: 2, or 1 as in the paper, which is too stiff in bending.
-    thickness_m : float, m
-        Out of the plane; in 2D it must be given, in 3D it must not.
+    ``mesh``: from ``shapes`` or ``mesh_file``. ``order``: of the elements: 2, or 1 as in the paper,
+    which is too stiff in bending. ``thickness_m``: out of the plane; in 2D it must be given, in 3D
+    it must not.
 
     Raises
     ------
@@ -125,13 +119,7 @@ class Pattern:
     def solve_linear(self, load_n: Array) -> Array:
         """Small displacements under loads; the first call factorises, the others reuse it.
 
-        Parameters
-        ----------
-        load_n : (n, d) float64, N
-
-        Returns
-        -------
-        (n, d) float64, m
+        Gives (n, d) float64, m. ``load_n``: (n, d) float64, N.
 
         Raises
         ------
@@ -166,14 +154,8 @@ class Pattern:
     def spread(self, outer_m: Array) -> Array:
         """Displacement of all nodes at rest for a given one of the outer surface; small ones.
 
-        Parameters
-        ----------
-        outer_m : (nv, d) float64, m
-            Of the vertices of the outer surface.
-
-        Returns
-        -------
-        (n, d) float64, m
+        Gives (n, d) float64, m. ``outer_m``, (nv, d) float64, m: of the vertices of the outer
+        surface.
         """
         d = self.space.dimension
         whole = np.zeros_like(self.space.node_m)
@@ -203,13 +185,7 @@ class Pattern:
     def stress_pa(self, displacement_m: Array, large: bool = False) -> Array:
         """Stress at the integration points: Cauchy's where displacements are large.
 
-        Parameters
-        ----------
-        displacement_m : (n, d) float64, m
-
-        Returns
-        -------
-        (ne, q, d, d) float64, Pa
+        Gives (ne, q, d, d) float64, Pa. ``displacement_m``: (n, d) float64, m.
         """
         slope = displacement_gradient(self.space, displacement_m)
         if not large:

@@ -19,6 +19,8 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.sparse import coo_array, csr_array
 
+from sandmould.geometry.mesh import TriangleMesh
+from sandmould.geometry.outline import Outline
 from sandmould.pattern_fe.space import Space
 
 Array = NDArray[np.float64]
@@ -140,10 +142,7 @@ def perimeter_of(space: Space) -> Perimeter:
 
 
 def _motion(space: Space) -> csr_array:
-    """Shares of nodes in the motion of places between which facets may lie, (places, n) float64.
-
-    Nodes come first, in their order; in hexahedra of first order middles of all faces follow.
-    """
+    """Shares of nodes in the motion of places of facets, (places, n) float64: nodes, then faces."""
     mesh, n, corners = space.mesh, len(space.node_m), space.mesh.nvertices
     between = [] if space.order == 1 else [mesh.edges.T if mesh.dim() == 3 else mesh.facets.T]
     if len(mesh.facets) == 4:
@@ -161,16 +160,8 @@ def _motion(space: Space) -> csr_array:
 
 
 def _split(faces: Indices, middle: Indices | None) -> tuple[Indices, int]:
-    """Triangles of quadrilaterals and their number in each.
-
-    Parameters
-    ----------
-    faces : (nf, 4) int64
-        Corners in turn; in a mesh twice as fine one is a corner of the first, with the least
-        number, and the one across from it the middle of a face.
-    middle : (nf,) int64 or None
-        Vertex in the middle of each, if it has one.
-    """
+    """Triangles of quadrilaterals and their number in each."""
+    # In a mesh twice as fine a corner of the first mesh has the least number: they begin there.
     if middle is not None:
         ends = np.stack([faces, np.roll(faces, -1, axis=1)], axis=2)
         around = np.broadcast_to(middle[:, None, None], (len(faces), 4, 1))
@@ -227,3 +218,40 @@ def _check_closed(triangles: Indices) -> None:
             f"surface of the pattern is open or touches itself along {bad} edges, valid is a "
             "closed surface of which two triangles meet in every edge"
         )
+
+
+@dataclass(frozen=True)
+class Distance:
+    """Distances of a deformed surface from the surface drawn."""
+
+    vertex_m: Array
+    """(nv,) float64, m: of each vertex; positive where it is outside the drawing."""
+    largest_m: float
+    rms_m: float
+    """Root of the mean square over the deformed surface, by area."""
+
+
+def distance_from_drawing(drawn: Perimeter, deformed: Perimeter) -> Distance:
+    """Measure from each vertex of the deformed surface to the nearest point of the drawn one.
+
+    What slides along itself has no distance.
+    """
+    place_m = deformed.vertices_m
+    if drawn.loops:
+        away_m = _from_lines_m(drawn, place_m)
+    else:
+        away_m = TriangleMesh("drawn", drawn.vertices_m, drawn.facets).distance_m(place_m)
+    rms_m = float(np.sqrt(np.average(away_m**2, weights=deformed.vertex_area_m2)))
+    return Distance(away_m, float(np.abs(away_m).max()), rms_m)
+
+
+def _from_lines_m(drawn: Perimeter, place_m: Array) -> Array:
+    """Signed distance from closed lines; the solid lies left of them, so holes run clockwise."""
+    distances_m = []
+    for loop in drawn.loops:
+        vertices_m = drawn.vertices_m[loop]
+        x, y = vertices_m.T
+        is_outer = np.dot(x, np.roll(y, -1)) > np.dot(y, np.roll(x, -1))
+        away_m = Outline("drawn", vertices_m).distance_m(place_m)
+        distances_m.append(away_m if is_outer else -away_m)
+    return np.asarray(np.max(distances_m, axis=0))

@@ -25,9 +25,7 @@ def tetrahedron_quality(mesh: Any) -> Array:
     r = 3 V / A, and 24 V R is the root of (a+b+c)(a+b-c)(a-b+c)(-a+b+c) for the products a, b, c of
     opposite edges.
 
-    Returns
-    -------
-    (ne,) float64
+    Gives (ne,) float64.
     """
     p = mesh.p[:, mesh.t].transpose(2, 1, 0)
     volume = np.abs(np.linalg.det(p[:, 1:] - p[:, :1])) / 6.0

@@ -29,14 +29,8 @@ def bar(width_m: float, height_m: float) -> list[Rectangle]:
 def l_shape(thickness_m: float, height_m: float, reach_m: float) -> list[Rectangle]:
     """Stem with a horizontal flange at its top, as the pattern of Rojek (2004), figure 17.
 
-    Parameters
-    ----------
-    thickness_m : float, m
-        Of stem and flange.
-    height_m : float, m
-        From the foot to the top of the flange.
-    reach_m : float, m
-        From the back of the stem to the tip of the flange.
+    ``thickness_m``: of stem and flange. ``height_m``: from the foot to the top of the flange.
+    ``reach_m``: from the back of the stem to the tip of the flange.
     """
     return [(0.0, 0.0, thickness_m, height_m), (0.0, height_m - thickness_m, reach_m, height_m)]
 

@@ -92,13 +92,7 @@ def _flat_axis(name: str, place_m: Array) -> int:
 def rigid_motions(node_m: Array) -> Array:
     """Translations along the axes and small rotations about the middle, all of a size.
 
-    Parameters
-    ----------
-    node_m : (n, d) float64, m
-
-    Returns
-    -------
-    (n d, 3 or 6) float64
+    Gives (n d, 3 or 6) float64. ``node_m``: (n, d) float64, m.
     """
     n, d = node_m.shape
     arm = (node_m - node_m.mean(axis=0)) / np.ptp(node_m, axis=0).max()
@@ -134,12 +128,7 @@ def _loose_of_body(node_m: Array, fixed: Mask) -> list[str]:
 
 
 def check_held(space: Space, fixed: Mask, supports: Supports) -> None:
-    """Refuse statics of a pattern that can move without deforming.
-
-    Raises
-    ------
-    ValueError
-    """
+    """Refuse statics of a pattern that can move without deforming (ValueError)."""
     if supports.bedding_n_m3 > 0.0:
         return
     loose = loose_motions(space, fixed)

@@ -193,14 +193,9 @@ class Surroundings:
     def is_clear(self, moved_m: Array, since: Clearance | None = None) -> bool:
         """Whether nothing touches, at next to no cost; False where that is not known.
 
-        Floor and walls are planes. An obstacle touches no vertex that has gone less far than it
-        was away, and its corners no facet whose vertices have.
-
-        Parameters
-        ----------
-        moved_m : (nv, d) float64, m
-        since : Clearance, optional
-            That it has moved from; the drawing unless given.
+        Floor and walls are planes. An obstacle touches no vertex that has gone less far than it was
+        away, and its corners no facet whose vertices have. ``moved_m``: (nv, d) float64, m.
+        ``since``: that it has moved from; the drawing unless given.
         """
         if self.wall_gaps_m(moved_m).min(initial=0.0) < 0.0:
             return False
@@ -304,12 +299,8 @@ def _of_vertices(gap_m: Array, normal: Array, vertex: Indices) -> Gaps:
 def points_on(solid: Solid, apart_m: float, low_m: Array, high_m: Array) -> Array:
     """Points along all edges of a solid that may lie inside a pattern, (k, d) float64, m.
 
-    Parameters
-    ----------
-    apart_m : float
-        Distance of the points: vertices of the pattern are farther apart.
-    low_m, high_m : (d,) float64, m
-        Box that the pattern may reach; points outside it are left out.
+    ``apart_m``: distance of the points: vertices of the pattern are farther apart. ``low_m``,
+    ``high_m``, (d,) float64, m: box that the pattern may reach; points outside it are left out.
     """
     if isinstance(solid, Revolved):
         solid = solid.mesh(_ROUND_SIDES)

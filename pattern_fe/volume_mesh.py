@@ -26,12 +26,8 @@ _LARGEST_CHANGE = 0.1
 def drawing_mesh(shape: PatternDrawing, drawn: TriangleMesh, size_m: float) -> Any:
     """Fill a drawing with tetrahedra, the extreme sides named.
 
-    Parameters
-    ----------
-    drawn : TriangleMesh
-        Its surface, about the drawing's origin, turned.
-    size_m : float, m
-        Longest side of an element, about.
+    ``drawn``: its surface, about the drawing's origin, turned. ``size_m``: longest side of an
+    element, about.
 
     Raises
     ------

@@ -30,10 +30,7 @@ def _product_of_slopes(i: int, j: int) -> BilinearForm:
 def element_stiffness_n_m(space: Space, foam: Foam) -> Array:
     """Forces that hold the nodes of each element over their small displacements.
 
-    Returns
-    -------
-    (ne, k d, k d) float64, N/m
-        Components node by node, x before y before z.
+    Gives (ne, k d, k d) float64, N/m; components node by node, x before y before z.
     """
     lam, mu = foam.lame_pa
     d, basis = space.dimension, space.basis(space.slope_degree)

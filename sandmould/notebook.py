@@ -24,8 +24,7 @@ import pandas as pd
 from sandmould.bad_input import BadInputError, Problem
 from sandmould.cli.study_file import study_file
 from sandmould.drawing.figures import draw_layers
-from sandmould.engines.snapshot import Snapshot
-from sandmould.engines.snapshot_file import stored_snapshots
+from sandmould.engines.snapshot import Snapshot, stored_snapshots
 from sandmould.execution.again import forget
 from sandmould.execution.cluster.queue import live_jobs
 from sandmould.execution.status import run_statuses

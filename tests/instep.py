@@ -7,9 +7,9 @@ from typing import Any
 
 from sandmould.pattern_fe.coupling.contact_rows import ContactRows
 from sandmould.pattern_fe.coupling.foam_body import FoamBody
-from sandmould.pattern_fe.coupling.in_step import InStepSession
 from sandmould.pattern_fe.coupling.in_step_foam import InStepFoam
 from sandmould.pattern_fe.coupling.interface import with_surface
+from sandmould.pattern_fe.coupling.stepped_sessions import InStepSession
 from sandmould.pattern_fe.pattern import Pattern
 from sandmould.scenario.scenario import Scenario
 from tests.scenes import open_engine

@@ -6,8 +6,7 @@ import zipfile
 from collections.abc import Iterable
 from pathlib import Path
 
-from sandmould.engines.snapshot import Snapshot
-from sandmould.engines.snapshot_file import SNAPSHOTS, SnapshotFile
+from sandmould.engines.snapshot import SNAPSHOTS, Snapshot, SnapshotFile
 
 _HEAD_BYTES = 30
 """Before the name of a member of a zip archive."""

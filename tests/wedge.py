@@ -12,11 +12,11 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from sandmould.engines.step_counts import StepCounts
+from sandmould.engines.program import StepCounts
 from sandmould.pattern_fe.coupling.explicit_foam import ContactBound, ExplicitFoam
 from sandmould.pattern_fe.coupling.foam_body import FoamBody
-from sandmould.pattern_fe.coupling.monolithic_session import MonolithicSession
 from sandmould.pattern_fe.coupling.session import CoupledSession
+from sandmould.pattern_fe.coupling.stepped_sessions import MonolithicSession
 from sandmould.pattern_fe.material import Foam
 from sandmould.pattern_fe.pattern import Pattern
 from sandmould.pattern_fe.shapes import bar, mesh_of

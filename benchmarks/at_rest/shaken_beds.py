@@ -8,9 +8,8 @@ from pathlib import Path
 from typing import Any
 
 from sandmould import ROOT
-from sandmould.engines.program import Stage, build_program
+from sandmould.engines.program import Stage, StepCounts, build_program
 from sandmould.engines.reference.session import ReferenceSession
-from sandmould.engines.step_counts import StepCounts
 from sandmould.kinds.sand.measure import measure_snapshot
 from sandmould.scenario.scenario import Scenario
 from sandmould.scenario.stages import StageKind

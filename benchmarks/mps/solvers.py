@@ -18,11 +18,10 @@ from scipy.sparse.linalg import cg, spsolve
 from benchmarks.mps.peers import PYTHON
 from benchmarks.mps.runs import LARGE_M
 from sandmould.casting.mps.flow import Flow
-from sandmould.casting.mps.overrelaxation import System, solve
-from sandmould.casting.mps.pressure import assemble
+from sandmould.casting.mps.pressure import System, assemble, solve
+from sandmould.casting.mps.scene import open_tank
 from sandmould.casting.mps.scheme import Scheme
 from sandmould.casting.mps.shoulder import open_shoulder
-from sandmould.casting.mps.tank import open_tank
 
 Array = NDArray[np.float64]
 PROGRAM = Path(__file__).parents[1] / "peers" / "run_pyamg.py"

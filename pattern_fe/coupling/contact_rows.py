@@ -74,10 +74,7 @@ def products_over(surface: Perimeter) -> Array:
 def shares_along(pattern: Pattern, apart_m: float) -> Array:
     """Shape functions at points along the outer line of a pattern, an even distance apart.
 
-    Returns
-    -------
-    (points, nv) float64
-        Shares of all vertices of the surface.
+    Gives (points, nv) float64; shares of all vertices of the surface.
     """
     vertices, line = pattern.surface.vertices_m, pattern.surface.outer_line
     number = np.arange(line.start, line.stop)
@@ -95,19 +92,10 @@ def shares_along(pattern: Pattern, apart_m: float) -> Array:
 
 
 def shares_on_top(pattern: Pattern, apart_m: float, up: float) -> csr_array:
-    """Shape functions at points of an even grid on all that faces up, in 3D.
+    """Shape functions at points of an even grid on all that faces up, in 3D, (points, nv) float64.
 
-    Parameters
-    ----------
-    apart_m : float, m
-        Least distance of two points; a face that is smaller has one, in its middle.
-    up : float
-        Share of a facet's area that must face up.
-
-    Returns
-    -------
-    (points, nv) float64
-        Shares of all vertices of the surface, sparse.
+    Shares of all vertices of the surface, sparse. ``apart_m``: least distance of two points; a face
+    that is smaller has one, in its middle. ``up``: share of a facet's area that must face up.
     """
     surface = pattern.surface
     area = surface.facet_area_vector_m2

@@ -118,7 +118,6 @@ def _is_clear(c: Any, pressed: Ints, moved: Floats) -> bool:
 
 @njit(**OPTIONS)
 def _measure(c: Any, pressed: Ints, moved: Floats) -> None:
-    """Take up the distances from the obstacles."""
     count = len(c.drawn)
     for v in range(count):
         x, y = moved[pressed[2 * v]], moved[pressed[2 * v + 1]]
@@ -230,6 +229,8 @@ def hold_out(
 ) -> bool:
     """Take a step anew with the reactions of what the pattern would enter.
 
+    Whether there are any; else ``impulse`` is left as it is.
+
     Parameters
     ----------
     c : ContactArrays, or what has its fields
@@ -240,11 +241,6 @@ def hold_out(
         Displacements before and after the step; the latter is changed.
     impulse : (n,) float64, kg m
         Overwritten: what reactions add to the product of mass and displacement.
-
-    Returns
-    -------
-    bool
-        Whether there are any; else ``impulse`` is left as it is.
     """
     walls, obstacles = _touches(c, pressed, before, moved)
     if not walls and not obstacles:

@@ -62,9 +62,7 @@ def rms_m(displacement_m: Array) -> float:
 def work_of(load_n: Array, moved_m: Array) -> float:
     """Work of the mean loads of a window on the way of the vertices in it, J.
 
-    Parameters
-    ----------
-    load_n, moved_m : (nv, d) float64, N and m
+    ``load_n``, ``moved_m``: (nv, d) float64, N and m.
     """
     return float((load_n * moved_m).sum())
 
@@ -87,12 +85,8 @@ class ConvergenceLog:
     ) -> None:
         """Open the table.
 
-        Parameters
-        ----------
-        trusted_bytes : int, optional
-            Length of what a checkpoint vouches for; without it the table begins anew.
-        kind : type
-            Frozen dataclass of the entries, a column a field.
+        ``trusted_bytes``: length of what a checkpoint vouches for; without it the table begins
+        anew. ``kind``: frozen dataclass of the entries, a column a field.
         """
         header = "\t".join(field.name for field in fields(kind)) + "\n"
         if trusted_bytes is None:

@@ -71,15 +71,10 @@ class ExplicitFoam:
     ) -> None:
         """Stand at rest as drawn.
 
-        Parameters
-        ----------
-        mass_scale : float, optional
-            Factor of all masses; just large enough for one step a step of the grains, and not
-            below 1, unless given. With a smaller one the pattern goes in shorter steps.
-        damping_ratio : float
-            Of the slowest mode, by mass damping.
-        surroundings : Surroundings, optional
-            What it can touch; nothing unless given.
+        ``mass_scale``: factor of all masses; just large enough for one step a step of the grains,
+        and not below 1, unless given. With a smaller one the pattern goes in shorter steps.
+        ``damping_ratio``: of the slowest mode, by mass damping. ``surroundings``: what it can
+        touch; nothing unless given.
 
         Raises
         ------
@@ -131,10 +126,7 @@ class ExplicitFoam:
     def advance(self, load_n: Array) -> None:
         """Go on by one step of the grains.
 
-        Parameters
-        ----------
-        load_n : (nv, d) float64, N
-            On the outer line, at the start of the step.
+        ``load_n``, (nv, d) float64, N: on the outer line, at the start of the step.
         """
         motion = self._motion
         load = self._surface.T @ load_n
@@ -149,13 +141,8 @@ class ExplicitFoam:
             self.contact_j -= motion.step_s * float(np.vdot(touched, self._surface @ mean))
 
     def _kept_out(self) -> Array:
-        """Take the step anew with the forces of what the pattern would enter, and give them.
-
-        They act at the start of the step and are just what leaves the gaps closed at its end
-        (forward increment Lagrange multipliers; Carpenter, Taylor and Katona, International Journal
-        for Numerical Methods in Engineering 32, 1991): a vertex stops without rebound, and no
-        stiffness of contact bounds the step.
-        """
+        """Take the step anew with the forces of what the pattern would enter, and give them."""
+        # Forward increment Lagrange multipliers, as in ``contact_step``: no rebound.
         around, free_m = self._surroundings, self.displacement_m
         self.contact_n = np.zeros_like(self.vertices_m)
         if around is None or around.is_clear(free_m, self._clearance):

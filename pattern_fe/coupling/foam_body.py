@@ -77,11 +77,8 @@ class FoamBody:
         )
 
     def _linear(self, load: Array) -> tuple[Array, Array]:
-        """Small displacements of all nodes, and the loads of what the vertices touch.
-
-        Floor and walls are planes: one problem has their reactions. Round obstacles their gaps are
-        linearised where the pattern has come to, from the drawing on, until it stays there.
-        """
+        """Small displacements of all nodes, and the loads of what the vertices touch."""
+        # Floor and walls are one problem; gaps of obstacles are linearised until it stays.
         pattern, around = self._pattern, self._surroundings
         moved, at_m = pattern.solve_linear(load), np.zeros_like(self.vertices_m)
         free_m = self._motion @ moved

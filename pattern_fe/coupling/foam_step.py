@@ -80,11 +80,8 @@ _FIELDS = len(FoamArrays._fields)
 
 @njit(**OPTIONS | {"fastmath": {"contract", "nsz", "reassoc"}})
 def _product(matrix: Floats, vector: Floats, result: Floats) -> None:
-    """Product of a symmetric matrix and a vector, their rows a multiple of four.
-
-    Memory is what it waits for: entries below the diagonal are not read, and sums along a row may
-    be taken in any order, as vector registers do it.
-    """
+    """Product of a symmetric matrix and a vector, their rows a multiple of four."""
+    # Memory is what it waits for: entries below the diagonal are not read.
     result[:] = 0.0
     for j in range(0, len(vector), 4):
         a, b, c, d = vector[j], vector[j + 1], vector[j + 2], vector[j + 3]

@@ -12,8 +12,8 @@ from scipy.sparse.linalg import SuperLU
 from sandmould.pattern_fe.coupling.body import StaticSolution
 from sandmould.pattern_fe.coupling.foam_body import cross
 from sandmould.pattern_fe.coupling.in_step_foam import InStepFoam
-from sandmould.pattern_fe.factor import factorised
 from sandmould.pattern_fe.pattern import Pattern
+from sandmould.pattern_fe.space import factorised
 from sandmould.pattern_fe.supports import rigid_motions
 
 Array = NDArray[np.float64]
@@ -30,12 +30,8 @@ class FreeBody:
     def __init__(self, pattern: Pattern, foam: InStepFoam) -> None:
         """Follow a pattern.
 
-        Parameters
-        ----------
-        pattern : Pattern
-            That nothing holds.
-        foam : InStepFoam
-            The same in motion: where it is, and what it touches.
+        ``pattern``: that nothing holds. ``foam``: the same in motion: where it is, and what it
+        touches.
         """
         self._pattern, self._foam = pattern, foam
         self._surface = pattern.surface.outer

@@ -39,17 +39,8 @@ def measure_gain(
 ) -> Gain | None:
     """Compute a window twice, once led a little farther along the solution; the session stays.
 
-    Parameters
-    ----------
-    session : SandSession
-        Of an engine that repeats windows.
-    displacement_m : (nv, d) float64, m
-        Displacement at the interface that the window leads to.
-
-    Returns
-    -------
-    Gain or None
-        None where no sand presses on the pattern.
+    None where no sand presses on the pattern. ``session``: of an engine that repeats windows.
+    ``displacement_m``, (nv, d) float64, m: displacement at the interface that the window leads to.
 
     Raises
     ------

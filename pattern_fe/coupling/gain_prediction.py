@@ -33,10 +33,7 @@ _UP = 0.5
 def predicted_gain(scenario: Scenario, pattern: Pattern, window_s: float) -> Gain:
     """Stiffness of a grain times the largest compliance of the pattern under the whole row.
 
-    Returns
-    -------
-    Gain
-        Its ``limit`` is the largest fixed factor that holds.
+    Its ``limit`` is the largest fixed factor that holds.
     """
     row = _row(scenario, pattern)
     count, dimension = row.shape[0], scenario.dimension

@@ -55,12 +55,8 @@ class InStepFoam:
     ) -> None:
         """Stand at rest as drawn.
 
-        Parameters
-        ----------
-        largest_m : float, m
-            Displacement beyond which the pattern has run away and stops.
-        damping_ratio : float
-            Of the slowest mode, by mass damping.
+        ``largest_m``: displacement beyond which the pattern has run away and stops.
+        ``damping_ratio``: of the slowest mode, by mass damping.
         """
         surface = pattern.condensed
         line = pattern.surface.outer_line

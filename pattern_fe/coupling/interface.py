@@ -23,9 +23,7 @@ from sandmould.scenario.solids import Triangles
 def with_surface(scenario: Scenario) -> Scenario:
     """The scenario with its pattern among the obstacles, vertex for vertex.
 
-    Raises
-    ------
-    BadInputError
+    Raises BadInputError.
     """
     config = scenario.pattern
     if config is None:

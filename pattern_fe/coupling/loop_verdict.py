@@ -107,13 +107,9 @@ def classify_loop(log: pd.DataFrame, stopped: bool = False) -> LoopVerdict | Non
     displacement. A loop that lags at the end of a run is no answer at rest either: sand can be at
     rest on a surface that is not where its loads bend the pattern.
 
-    Parameters
-    ----------
-    log : DataFrame
-        Of any scheme; rows in order of time. Without ``residual_m`` it has no windows: the pattern
-        was stepped with the grains.
-    stopped : bool
-        Whether the run ended because its pattern ran away.
+    ``log``: of any scheme; rows in order of time. Without ``residual_m`` it has no windows: the
+    pattern was stepped with the grains. ``stopped``: whether the run ended because its pattern ran
+    away.
     """
     if log.empty or not log["load_n"].any():
         return LoopVerdict("diverged", np.nan, 0, np.nan, np.nan, 0.0) if stopped else None

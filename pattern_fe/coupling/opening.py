@@ -8,18 +8,16 @@ from pathlib import Path
 import numpy as np
 
 from sandmould.bad_input import BadInputError, Problem
-from sandmould.engines.program import Program
+from sandmould.engines.program import Program, StepCounts
 from sandmould.engines.registry import engine_of
 from sandmould.engines.session import Session
-from sandmould.engines.step_counts import StepCounts
 from sandmould.pattern_fe.coupling.explicit_foam import ExplicitFoam
 from sandmould.pattern_fe.coupling.foam_body import FoamBody
 from sandmould.pattern_fe.coupling.free_body import FreeBody
-from sandmould.pattern_fe.coupling.in_step import InStepSession
-from sandmould.pattern_fe.coupling.monolithic_session import MonolithicSession
 from sandmould.pattern_fe.coupling.schemes import explicit_foam, in_step_foam
 from sandmould.pattern_fe.coupling.selective_mass import SelectiveMass
 from sandmould.pattern_fe.coupling.session import CoupledSession
+from sandmould.pattern_fe.coupling.stepped_sessions import InStepSession, MonolithicSession
 from sandmould.pattern_fe.pattern import Pattern
 from sandmould.pattern_fe.scene import pattern_of, surroundings_of
 from sandmould.scenario.pattern import PatternDrawing
@@ -33,14 +31,8 @@ def open_coupled(
 ) -> Session:
     """Open a coupled session on a rendered deck, afresh or from a checkpoint.
 
-    Parameters
-    ----------
-    program : Program
-        Of a scenario whose pattern is among its obstacles.
-    folder : Path
-        Where the deck lies.
-    log : Path
-        The engine's log; tables of the pattern lie beside it.
+    ``program``: of a scenario whose pattern is among its obstacles. ``folder``: where the deck
+    lies. ``log``: the engine's log; tables of the pattern lie beside it.
     """
     scenario = program.scenario
     config = scenario.pattern

@@ -21,10 +21,7 @@ class PatternRest:
     """
 
     def __init__(self, sand: SandSession, load_tolerance: float | None) -> None:
-        """Watch a pattern.
-
-        ``load_tolerance``: ``rest.load_tolerance``; None holds no stage.
-        """
+        """Watch a pattern. ``load_tolerance``: ``rest.load_tolerance``; None holds no stage."""
         self._sand = sand
         self.share = np.inf if load_tolerance is None else 0.5 * load_tolerance
         """Part of the way that may be left."""
@@ -32,12 +29,8 @@ class PatternRest:
     def see(self, displacement_m: Array, solved_m: Array) -> None:
         """Hold the stage where a surface is too far from where its loads bend it.
 
-        Parameters
-        ----------
-        displacement_m : (nv, d) float64, m
-            Of the surface, as the sand meets it.
-        solved_m : (nv, d) float64, m
-            At rest under the mean loads of the last window.
+        ``displacement_m``, (nv, d) float64, m: of the surface, as the sand meets it. ``solved_m``,
+        (nv, d) float64, m: at rest under the mean loads of the last window.
         """
         left_m, way_m = rms_m(solved_m - displacement_m), rms_m(displacement_m)
         if left_m > self.share * way_m:

@@ -45,12 +45,8 @@ class PatternSession(DelegatingSession, ABC):
     ) -> None:
         """Start with no load; tables are opened by ``_begin``.
 
-        Parameters
-        ----------
-        body : ElasticBody
-            The pattern at rest under given loads.
-        surface : str
-            Its name in the engine, vertex for vertex that of the body.
+        ``body``: the pattern at rest under given loads. ``surface``: its name in the engine, vertex
+        for vertex that of the body.
         """
         super().__init__(sand)
         self._body, self._surface = body, surface
@@ -130,7 +126,6 @@ class SteppedSession(PatternSession, Generic[Foam]):
         ----------
         sand, body, surface, load_tolerance
             See ``PatternSession``; the body is the same pattern at rest.
-        foam : ExplicitFoam or InStepFoam
         """
         super().__init__(sand, body, surface, load_tolerance)
         self._foam: Foam = foam

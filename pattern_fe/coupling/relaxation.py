@@ -156,10 +156,7 @@ class AitkenRelaxation(Relaxation):
 
     @staticmethod
     def _secant(before: Array, after: Array) -> float:
-        """Part of the way from one residual to another at which it would vanish.
-
-        All of it where they differ by less than squares of numbers can tell: the factor stays.
-        """
+        """Part of the way between residuals at which it vanishes; all where they hardly differ."""
         change = after - before
         square = float(change @ change)
         return -float(before @ change) / square if square > 0.0 else 1.0

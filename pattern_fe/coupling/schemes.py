@@ -7,8 +7,8 @@ from typing import get_args
 from threadpoolctl import threadpool_limits
 
 from sandmould.bad_input import BadInputError, Problem
-from sandmould.engines.capabilities import Capabilities
 from sandmould.engines.registry import engine_of, engines_that
+from sandmould.engines.session import Capabilities
 from sandmould.limits import STEPPED_COMPONENTS
 from sandmould.pattern_fe.coupling.contact_rows import ContactRows
 from sandmould.pattern_fe.coupling.explicit_foam import ContactBound, ExplicitFoam
@@ -37,12 +37,7 @@ def can_couple(scheme: Scheme, engine: Capabilities) -> bool:
 
 
 def refuse_scheme(scenario: Scenario, pattern: Pattern) -> None:
-    """Refuse a scheme that cannot go with the rest of the scenario.
-
-    Raises
-    ------
-    BadInputError
-    """
+    """Refuse a scheme that cannot go with the rest of the scenario (BadInputError)."""
     assert scenario.pattern is not None
     loop, scheme = scenario.pattern.loop, scenario.pattern.loop.scheme
     name, engine = scenario.engine.name, engine_of(scenario).CAPABILITIES

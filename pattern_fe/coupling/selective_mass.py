@@ -65,13 +65,9 @@ def selective_mass(
 ) -> SelectiveMass:
     """Find the least masses that bear a step and the contacts.
 
-    Parameters
-    ----------
-    surface : CondensedSurface
-        With the pattern's own masses.
-    scale : float, optional
-        Factor of the pattern's own masses, raised to the least that leaves ``LIKE_FOAM`` of the
-        first frequency to them; unless given the least from 1 on that leaves ``1 - SLOWED``.
+    ``surface``: with the pattern's own masses. ``scale``: factor of the pattern's own masses,
+    raised to the least that leaves ``LIKE_FOAM`` of the first frequency to them; unless given the
+    least from 1 on that leaves ``1 - SLOWED``.
 
     Raises
     ------
@@ -105,7 +101,6 @@ def selective_mass(
 
 
 def _first(square_1_s2: Array) -> float:
-    """Least square of an angular frequency above 0."""
     return float(square_1_s2[square_1_s2 > 0.0].min())
 
 

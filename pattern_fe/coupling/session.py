@@ -9,8 +9,8 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
+from sandmould.engines.program import StepCounts
 from sandmould.engines.session import EngineStop, SandSession
-from sandmould.engines.step_counts import StepCounts
 from sandmould.pattern_fe.coupling.body import ElasticBody, StaticSolution
 from sandmould.pattern_fe.coupling.convergence_log import (
     WindowEntry,
@@ -156,10 +156,7 @@ class CoupledSession(PatternSession):
             self._shapes.write(sand.time_s, self.displacement_m)
 
     def _measure(self, window_s: float) -> None:
-        """Measure the gain anew: sand that falls, settles or is shaken changes it.
-
-        Without a load the factor stays.
-        """
+        """Measure the gain anew, which moving sand changes; without a load the factor stays."""
         relaxation = self._relaxation
         if isinstance(relaxation, MeasuredRelaxation):
             measured = measure_gain(self.sand, self._body, self._surface, self._next, window_s)

@@ -13,10 +13,10 @@ from pydantic_core import PydanticCustomError
 
 from sandmould.bad_input import Problem
 from sandmould.limits import RUNS
-from sandmould.scenario.moved_keys import instead_of
 from sandmould.scenario.quantity import Section, fields_at, quantity
 from sandmould.scenario.reading import Tree
 from sandmould.scenario.sand import ARGUED
+from sandmould.scenario.standing_keys import instead_of
 
 Design = Literal["grid", "zipped", "list", "latin_hypercube", "sobol"]
 Point = dict[str, Any]

@@ -75,14 +75,9 @@ class PairCoefficients(NamedTuple):
 def pair_coefficients(law: Law, mass: float, smaller: float, effective: float) -> PairCoefficients:
     """Apply a law to sizes.
 
-    Parameters
-    ----------
-    mass : float, kg
-        m1 m2 / (m1 + m2), or m1 at a surface, eq. (21).
-    smaller : float, m
-        Smaller of the two radii, eq. (33), or r1 at a surface.
-    effective : float, m
-        r1 r2 / (r1 + r2), or r1 at a surface.
+    ``mass``, kg: m1 m2 / (m1 + m2), or m1 at a surface, eq. (21). ``smaller``, m: smaller of the
+    two radii, eq. (33), or r1 at a surface. ``effective``, m: r1 r2 / (r1 + r2), or r1 at a
+    surface.
 
     Notes
     -----

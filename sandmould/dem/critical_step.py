@@ -87,7 +87,6 @@ class _Ends(NamedTuple):
 
 
 def _pair_ends(solver: Solver) -> _Ends:
-    """Contacts between grains."""
     grains, contacts = solver.grains, solver.contacts
     i, j = contacts.first, contacts.second
     apart = grains.position[j] - grains.position[i]
@@ -123,11 +122,9 @@ def _tangents(normal: Floats) -> Floats:
 
 
 def _rows(solver: Solver, ends: _Ends, law: Law) -> ActiveContacts:
-    """Turn springs of eqs. (16), (25) and (29) into rows.
-
-    The slip of grain 2 over grain 1 along a tangent t is
-    (v_2 - v_1) t - (a_1 w_1 + a_2 w_2) (n x t), where in 2D n x t = 1.
-    """
+    """Turn springs of eqs. (16), (25) and (29) into rows."""
+    # The slip of grain 2 over grain 1 along a tangent t is
+    # (v_2 - v_1) t - (a_1 w_1 + a_2 w_2) (n x t), where in 2D n x t = 1.
     n, grains = ends.normal, solver.grains
     c, d = n.shape
     tangents = _tangents(n)
@@ -214,7 +211,6 @@ def whole_step(contacts: ActiveContacts, of_step_s: float | None = None) -> Stab
     """Eigenproblem of all grains together.
 
     The damped step is exact for central differences, whether or not the modes are damped alike.
-
     ``of_step_s``: step that dashpots are corrected for; by default the limit itself.
     """
     if not len(contacts.first):

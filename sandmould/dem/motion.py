@@ -81,12 +81,8 @@ def kick(
 ) -> None:
     """Advance velocities and spins of some grains, eqs. (3)-(4) and (6)-(7).
 
-    Parameters
-    ----------
-    body : tuple of d floats, m/s2
-        Gravity and, in the frame of the box, minus its acceleration, eq. (58).
-    dt : float, s
-        Negative for half a step back to the time of the positions.
+    ``body``, tuple of d floats, m/s2: gravity and, in the frame of the box, minus its acceleration,
+    eq. (58). ``dt``, s: negative for half a step back to the time of the positions.
     """
     velocity, spin, force, moment = grains.velocity, grains.spin, grains.force, grains.moment
     kind, mass, inertia = grains.kind, grains.mass_of, grains.inertia_of
@@ -110,10 +106,7 @@ def kick(
 def drift(dim: Any, first: int, last: int, grains: Grains, dt: float) -> float:
     """Advance positions of some grains, eq. (5).
 
-    Returns
-    -------
-    float, m2/s2
-        Largest squared speed; not a number as soon as one speed is none.
+    Gives the largest squared speed, m2/s2; not a number as soon as one speed is none.
     """
     position, velocity = grains.position, grains.velocity
     largest2, sound = 0.0, 0.0

@@ -1,4 +1,10 @@
-"""All that the step loop moves as named arrays, and back: what a checkpoint keeps."""
+"""All that the step loop moves as named arrays, and back: what a checkpoint keeps.
+
+Chunks are grains stored one after the other, which one thread computes. A chunk writes to its own
+grains alone: results do not depend on how threads are scheduled, nor on their number. What a
+contact law makes of two kinds of grain, roots and quotients of their sizes, is what a contact costs
+most, and the same in every step: it is found once for each two kinds.
+"""
 
 from __future__ import annotations
 
@@ -7,17 +13,54 @@ from typing import Any
 
 import numpy as np
 
+from sandmould.compiled import njit
 from sandmould.dem.broad_phase import Candidates
-from sandmould.dem.chunks import chunk_bounds
-from sandmould.dem.contact_law import Law
-from sandmould.dem.grains import Grains
-from sandmould.dem.kinds import pair_up
+from sandmould.dem.contact_law import Law, pair_coefficients
+from sandmould.dem.grains import Floats, Grains, Ints
 from sandmould.dem.near_pairs import Contacts, contacts_of, new_near_pairs
 from sandmould.dem.neighbours import Pairs
 from sandmould.dem.steps import Moving, new_walls
 from sandmould.dem.surfaces import SurfaceArrays
-from sandmould.dem.vectors import dim_of
+from sandmould.dem.vectors import OPTIONS, dim_of
 from sandmould.dem.wall_history import WallHistory
+
+CHUNK = 4096
+"""Grains of a chunk."""
+
+
+@njit(**OPTIONS)
+def _pair_up(radius: Floats, mass: Floats, law: Law, coefficients: Floats) -> None:
+    for i in range(len(radius)):
+        for j in range(len(radius)):
+            r_i, r_j, m_i, m_j = radius[i], radius[j], mass[i], mass[j]
+            of_two = pair_coefficients(
+                law, m_i * m_j / (m_i + m_j), min(r_i, r_j), r_i * r_j / (r_i + r_j)
+            )
+            # One by one: a row at once takes three seconds longer to compile.
+            for k in range(len(of_two)):
+                coefficients[i, j, k] = of_two[k]
+
+
+def pair_up(grains: Grains, law: Law) -> Floats:
+    """What each two of k kinds make of each other, (k, k, 3) float64.
+
+    The fields of ``PairCoefficients``.
+    """
+    kinds = len(grains.radius_of)
+    coefficients = np.zeros((kinds, kinds, 3))
+    _pair_up(grains.radius_of, grains.mass_of, law, coefficients)
+    return coefficients
+
+
+def chunk_bounds(grains: int) -> Ints:
+    """Split grains into chunks of about ``CHUNK``; how many depends on the scene alone.
+
+    Their number is even, so that two threads share them evenly.
+
+    Gives (c + 1,) int64; first grain of each chunk.
+    """
+    chunks = max(1, 2 * round(grains / (2 * CHUNK)))
+    return np.linspace(0, grains, chunks + 1).astype(np.int64)
 
 
 def to_arrays(moving: Moving) -> dict[str, np.ndarray]:

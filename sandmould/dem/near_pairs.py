@@ -203,11 +203,8 @@ def _choose(
     place: Ints,
     kept: Ints,
 ) -> tuple[Ints, Ints, Places, Ints]:
-    """Near pairs of a chunk among the listed ones.
-
-    Given are where those of each grain end and how many of them touch, (n,) int64; and of each the
-    other grain, and where the history of its row was kept, or -1.
-    """
+    """Near pairs of a chunk among the listed ones."""
+    # Where each grain's end and how many touch, (n,) int64; the other grains; old rows or -1.
     # Names of their own: taking an array out of a tuple inside the loop counts references.
     start, listed, old_other, width = pairs.start, pairs.other, near.other, near.grain.shape[1]
     position, kind, radius, gap = grains.position, grains.kind, grains.radius_of, near.gap[0]
@@ -238,10 +235,7 @@ def _choose(
 
 @njit(**OPTIONS)
 def _arrange(stop: Ints, touching: Ints, width: int) -> tuple[Ints, Ints]:
-    """Grains of a chunk, counted from its first, in the order of lanes; and rows of each slice.
-
-    Those that touch others come first: no slice without a contact finds any force.
-    """
+    """Grains of a chunk in the order of lanes, touching ones first; and rows of each slice."""
     n = len(stop)
     order, rows = (
         np.empty(-(-n // width) * width, dtype=np.int64),
@@ -289,7 +283,6 @@ def look(dim: Any, c: int, bound: Ints, grains: Grains, pairs: Pairs, near: Near
 
     Parameters
     ----------
-    dim : tuple of d floats
     c : int
         The chunk.
     bound : (c + 1,) int64
@@ -362,7 +355,6 @@ def new_near_pairs(
 
     Parameters
     ----------
-    dim : tuple of d floats
     bound : (c + 1,) int64
         First grains of the chunks.
     grains : Grains
@@ -417,12 +409,7 @@ def near_gap(skin: float, way: float) -> float:
 def watch(near: NearPairs, way: float, skin: float) -> None:
     """Say whether a look is due after all grains have moved.
 
-    Parameters
-    ----------
-    way : float, m
-        Longest way of a grain in this step.
-    skin : float, m
-        Gap of listed pairs.
+    ``way``, m: longest way of a grain in this step. ``skin``, m: gap of listed pairs.
     """
     near.left[0] -= way
     near.gap[0] = -1.0

@@ -17,19 +17,7 @@ FAR = math.inf
 def _on_segment(
     start_x: float, start_y: float, end_x: float, end_y: float, x: float, y: float, reach: float
 ) -> Any:
-    """Nearest point of a segment in a plane.
-
-    Returns
-    -------
-    distance : float, m
-        ``FAR`` where the segment lies out of reach.
-    n_x, n_y : float
-        Unit vector to the nearest point.
-    share : float
-        How far along the segment the point lies, 0 to 1.
-    inside : bool
-        Whether it lies between the ends.
-    """
+    """Nearest point of a segment: distance or ``FAR``, unit vector, share, whether inside."""
     along_x, along_y = end_x - start_x, end_y - start_y
     length2 = along_x * along_x + along_y * along_y
     from_x, from_y = x - start_x, y - start_y
@@ -57,23 +45,8 @@ def _share(numerator: float, denominator: float) -> float:
 
 @njit(**INLINED)
 def _on_triangle(a: Any, b: Any, c: Any, x: Any, reach: float) -> Any:
-    """Nearest point of a triangle, by the regions of its corners and edges.
-
-    Returns
-    -------
-    distance : float, m
-        ``FAR`` where the plane of the triangle lies out of reach.
-    n : tuple of 3 floats
-        Unit vector to the nearest point.
-    weights : tuple of 3 floats
-        Barycentric coordinates of the point.
-    inside : bool
-        Whether it lies inside the triangle.
-
-    Notes
-    -----
-    Ericson, Real-Time Collision Detection (2005), section 5.1.5.
-    """
+    """Nearest point of a triangle: distance or ``FAR``, unit vector, weights, whether inside."""
+    # By the regions of its corners and edges: Ericson, Real-Time Collision Detection (2005), 5.1.5.
     ab, ac, ax = plus(b, -1.0, a), plus(c, -1.0, a), plus(x, -1.0, a)
     normal = (
         ab[1] * ac[2] - ab[2] * ac[1],
@@ -153,7 +126,6 @@ def nearest(
 
     Parameters
     ----------
-    dim : tuple of d floats
     vertices, planes, shape, corner
         Of the ``SurfaceArrays``: a tuple of arrays costs more than its arrays.
     x : tuple of d floats, m

@@ -50,11 +50,8 @@ class Grid(NamedTuple):
 def make_grid(low: Floats, high: Floats, size: float, grains: int) -> Grid:
     """Lay a grid over a region, with a few cells a grain at most however wide the region is.
 
-    Parameters
-    ----------
-    low, high : (d,) float64, m
-    size : float, m
-        Least edge of a cell: the reach of the pairs to be found.
+    ``low``, ``high``: (d,) float64, m. ``size``, m: least edge of a cell: the reach of the pairs to
+    be found.
     """
     span = np.maximum(high - low, size)
     size = max(size, float(np.prod(span) / (4 * grains + 64)) ** (1 / len(span)))

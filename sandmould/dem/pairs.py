@@ -49,6 +49,9 @@ def pass_pairs(
 
     Grains that move on read nothing that others write: what they become goes to arrays of its own.
 
+    Gives the largest squared speed of grains that move on, m2/s2; not a number as soon as one speed
+    is none.
+
     Parameters
     ----------
     dim : tuple
@@ -67,11 +70,6 @@ def pass_pairs(
     dt : float, s
     moves : bool
         Whether the grains move on.
-
-    Returns
-    -------
-    float, m2/s2
-        Largest squared speed of grains that move on; not a number as soon as one speed is none.
     """
     # Names of their own: taking an array out of a tuple inside the loop counts references.
     position, velocity, spin = grains.position, grains.velocity, grains.spin

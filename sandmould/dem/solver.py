@@ -11,14 +11,11 @@ from typing import Any
 import numpy as np
 
 from sandmould.dem.barrier import new_barrier
-from sandmould.dem.broad_phase import Candidates, candidates_in
-from sandmould.dem.chunks import chunk_bounds
-from sandmould.dem.facet_grid import FacetGrids
+from sandmould.dem.broad_phase import Candidates, FacetGrids, candidates_in
 from sandmould.dem.grains import Floats, Grains
-from sandmould.dem.kinds import pair_up
 from sandmould.dem.lanes import lanes_of_processor
 from sandmould.dem.motion import kick
-from sandmould.dem.moving_state import from_arrays, to_arrays
+from sandmould.dem.moving_state import chunk_bounds, from_arrays, pair_up, to_arrays
 from sandmould.dem.near_pairs import Contacts, contacts_of, move_contacts, near_gap, new_near_pairs
 from sandmould.dem.neighbours import Pairs, extent_of, list_pairs, make_grid, sort_into_cells
 from sandmould.dem.steps import (
@@ -177,9 +174,7 @@ class Solver:
         """Go on with the step of the scene from a state that was computed with another one.
 
         Velocities stood half of the other step before now, and now stand half of this one before
-        it. The box must stand.
-
-        ``steps``: those that count as done from now on.
+        it. The box must stand. ``steps``: those that count as done from now on.
         """
         scene, grains = self.scene, self.grains
         lag_s = 0.5 * (earlier_s - scene.dt)
@@ -281,11 +276,7 @@ class Solver:
         """Compute as many steps as displacements are given, less two.
 
         ``displacement_m``, (steps + 2,) float64, m: of the box along its direction, from one step
-        before now to one step beyond the last.
-
-        Raises
-        ------
-        NotANumberError
+        before now to one step beyond the last. Raises NotANumberError.
         """
         steps, done, drifted = len(displacement_m) - 2, 0, False
         while done < steps:
@@ -312,13 +303,7 @@ class Solver:
     def _together(
         self, loop: Callable[..., Any], steps: int, drifted: bool, displacement_m: Floats, *own: Any
     ) -> tuple[int, int]:
-        """Call a step loop in all threads: arguments as of ``advance``, then its own.
-
-        Returns
-        -------
-        done, state : int
-            See ``advance``; all threads end alike.
-        """
+        """Call a step loop in all threads: arguments and result as of ``advance``, then its own."""
         chunks = len(self.moving.bound) - 1
         threads = min(self._threads, chunks)
         team = Team(

@@ -239,7 +239,6 @@ def find_forces(dim: tuple[float, ...], scene: DemScene, moving: Moving) -> None
     """Find the forces of the places as they are, before any friction; the box is at rest.
 
     Compiled code does not call it: with constants it would compile ``step_chunk`` a second time.
-
     ``dim``: ``PLANE`` or ``SPACE``, which is also the shift, speed and body force: none.
     """
     for c in range(len(moving.bound) - 1):

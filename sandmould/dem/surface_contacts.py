@@ -107,7 +107,6 @@ def surface_forces(
 
     Parameters
     ----------
-    dim : tuple of d floats
     first_row, last_row : int
         Rows first_row ... last_row - 1 of the candidates: several threads take rows of their own.
     position, velocity : (n, d or 3) float64, m and m/s

@@ -95,14 +95,8 @@ class Surfaces:
     def add_plane(self, name: str, point_m: ArrayLike, normal: ArrayLike) -> None:
         """Add an unbounded plane with the sand on the side of its normal.
 
-        A grain whose centre has passed it is still pushed back.
-
-        Parameters
-        ----------
-        point_m : (d,) float64, m
-            Any point of the plane.
-        normal : (d,) float64
-            Of any length.
+        A grain whose centre has passed it is still pushed back. ``point_m``, (d,) float64, m: any
+        point of the plane. ``normal``, (d,) float64: of any length.
         """
         d = self.dimension
         shape = np.zeros((1, 7))
@@ -113,11 +107,7 @@ class Surfaces:
     def add_facets(self, name: str, vertices_m: ArrayLike, facets: ArrayLike) -> None:
         """Add segments (2D) or triangles (3D), open or closed, touched from either side.
 
-        Parameters
-        ----------
-        vertices_m : (nv, d) float64, m
-        facets : (nf, d) int64
-            Vertices of each facet.
+        ``vertices_m``: (nv, d) float64, m. ``facets``, (nf, d) int64: vertices of each facet.
 
         Raises
         ------
@@ -223,11 +213,8 @@ class Surfaces:
     ) -> None:
         """Let a surface move evenly to new vertices within a window, then stay there.
 
-        Parameters
-        ----------
-        target_vertices_m : (nv, d) float64, m
-        window_s, step_s : float, s
-            The window is rounded up to whole steps.
+        ``target_vertices_m``: (nv, d) float64, m. ``window_s``, ``step_s``: the window is rounded
+        up to whole steps.
         """
         rows = self._range[name]
         target = _rows(target_vertices_m, self.dimension, f"target of surface {name}")

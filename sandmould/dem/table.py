@@ -97,10 +97,7 @@ def _advance(
     table: MountedTable,
     drive: TableDrive,
 ) -> tuple[int, int]:
-    """See ``steps.advance``, which computes every step; the table moves before each.
-
-    ``place`` is its displacement: the first two are given, the others are found.
-    """
+    """See ``steps.advance``; before each step the table moves, of whose ``place`` two are given."""
     done, state = steps, DONE
     one = int(np.int64(1))  # for a literal numba would compile it once more
     for k in range(steps):
@@ -136,14 +133,8 @@ class TableSolver(Solver):
 
         ``drive``: its length is the number of steps.
 
-        Returns
-        -------
-        (steps + 2,) float64, m
-            Places of the table, from one step before the first to one step beyond the last.
-
-        Raises
-        ------
-        NotANumberError
+        Gives (steps + 2,) float64, m; places of the table, from one step before the first to one
+        step beyond the last. Raises NotANumberError.
         """
         places = np.zeros(len(drive.push_n) + 2)
         places[:2] = self.table_places_m
@@ -163,7 +154,6 @@ class TableSolver(Solver):
         return place
 
     def _run(self, steps: int, drifted: bool, displacement_m: Floats) -> tuple[int, int]:
-        """Let all threads run the step loop together."""
         if self._table is None:
             return super()._run(steps, drifted, displacement_m)
         table, whole = self._table

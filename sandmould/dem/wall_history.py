@@ -91,11 +91,7 @@ def new_history(dim: Any, m: int) -> WallHistory:
 
 @njit(**OPTIONS)
 def _room(dim: Any, parts: int, used: int) -> int:
-    """Slots that a grain near some parts needs, of which some are used.
-
-    A contact takes over a used slot or moves it behind the others, where the next contact of the
-    same step finds it. A grain near one part has one contact.
-    """
+    """Slots that a grain near some parts needs: a contact moves a used one behind the others."""
     if parts == 1:
         return max(1, used)
     return min(slots(dim), parts + max(parts, used))
@@ -109,7 +105,6 @@ def carry_history(
 
     Parameters
     ----------
-    dim : tuple of d floats
     old_ids, new_ids : (m,) integers
         Which grain, by an identity that outlives sorting, each row stands for; not negative.
     old : WallHistory

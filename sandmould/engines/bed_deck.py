@@ -64,9 +64,8 @@ def render_parts(
 ) -> Deck:
     """Render a deck, in two parts where it takes its time step from the filled bed.
 
-    Before the bed is known the planned step stands in the second part too.
-
-    ``context_of``: names and values for the templates, of a program.
+    Before the bed is known the planned step stands in the second part too. ``context_of``: names
+    and values for the templates, of a program.
     """
     scenario, filled = program.scenario, program.fill_stages
     if not scenario.takes_step_of_bed or filled == len(program.stages):
@@ -90,10 +89,7 @@ def render_parts(
 
 
 def _given_anew(text: str, earlier: str) -> str:
-    """Let a part give the numbers that differ from those of an earlier part.
-
-    A number that can be changed from outside is given once, unless it is deleted.
-    """
+    """Let a part give the numbers that differ from an earlier part's, which it deletes first."""
     before = dict(_NUMBER.findall(earlier))
 
     def anew(number: re.Match[str]) -> str:

@@ -25,10 +25,7 @@ def limit_of_snapshot_s(
 
     ``opened``: plates that were taken away.
 
-    Returns
-    -------
-    float, s
-        See ``sandmould.engines.session.Session.exact_limit_s``.
+    See ``sandmould.engines.session.Session.exact_limit_s``.
     """
     d, n = scenario.dimension, len(snapshot.id)
     still, unturned = np.zeros((n, d)), np.zeros((n, 1 if d == 2 else 3))

@@ -4,9 +4,8 @@ from __future__ import annotations
 
 import math
 
-from sandmould.engines.program import Program
+from sandmould.engines.program import Program, StepCounts
 from sandmould.engines.session import EngineStop
-from sandmould.engines.step_counts import StepCounts
 from sandmould.runs.outcome import Outcome
 from sandmould.runs.products import Cost
 from sandmould.scenario.scenario import Scenario
@@ -24,18 +23,9 @@ _GOLDEN = 0.5 * (math.sqrt(5.0) - 1.0)
 def with_bed_step(scenario: Scenario, limit_s: float) -> Scenario:
     """Give a scene the step of its filled bed, for all that follows the fill.
 
-    Parameters
-    ----------
-    scenario : Scenario
-        That takes it, not had it before.
-    limit_s : float
-        Exact limit of the bed; infinite where nothing touches, and the planned step stays.
-
-    Returns
-    -------
-    Scenario
-        The same with that ``time_step.step_s``, rounded down. One of the user's own stays, and gets
-        its ``bed_fraction``.
+    The same with that ``time_step.step_s``, rounded down. One of the user's own stays, and gets its
+    ``bed_fraction``. ``scenario``: that takes it, not had it before. ``limit_s``: exact limit of
+    the bed; infinite where nothing touches, and the planned step stays.
 
     Raises
     ------
@@ -74,10 +64,7 @@ def limit_moments(program: Program) -> list[int]:
     One lies in each twentieth of the vibration, at a place that goes round by the golden section:
     at equal distances all might find the box at one phase.
 
-    Returns
-    -------
-    list of int
-        In steps of vibration; rests in between do not count.
+    In steps of vibration; rests in between do not count.
     """
     counts = StepCounts.of(program.scenario)
     shaken = [stage.vibration for stage in program.stages if stage.counts_as_vibration]

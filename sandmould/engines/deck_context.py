@@ -15,8 +15,7 @@ from sandmould.engines.deck_lines import (
     skin_m,
     vibration_key,
 )
-from sandmould.engines.program import Program, Stage
-from sandmould.engines.step_counts import StepCounts
+from sandmould.engines.program import Program, Stage, StepCounts
 
 
 def _checks(program: Program) -> dict[str, tuple[int, int]]:

@@ -11,14 +11,13 @@ from pathlib import Path
 from types import FrameType
 
 from sandmould.engines.bed_step import MOST_AGAIN, limit_moments, limit_notes, with_bed_step
-from sandmould.engines.blockage import what_blocks
 from sandmould.engines.durations import cost_before, grain_steps, run_s
 from sandmould.engines.guard import Guard
-from sandmould.engines.program import Program, Stage, build_program
+from sandmould.engines.program import Program, Stage, StepCounts, build_program
 from sandmould.engines.recording import Recorder
 from sandmould.engines.registry import engine_of
+from sandmould.engines.rest import what_blocks
 from sandmould.engines.session import EngineStop, Session
-from sandmould.engines.step_counts import StepCounts
 from sandmould.runs import checkpoint_folders as checkpoints
 from sandmould.runs.checkpoint_folders import CheckpointMark
 from sandmould.runs.outcome import Outcome, RunOutcome
@@ -144,10 +143,7 @@ class Driver:
         return RunOutcome(outcome, detail, self._simulated_s, run_s(self._program))
 
     def _go_on(self, newest: tuple[Path, CheckpointMark] | None) -> bool:
-        """Compute in a session from a checkpoint, or from the beginning; whether the run has ended.
-
-        It has not where the bed has given another step, with which the next session goes on.
-        """
+        """Compute from a checkpoint or the beginning; False where the bed gives another step."""
         mark = newest[1] if newest else None
         if mark is not None and mark.bed_limit_s is not None:
             self._take_step_of_bed(mark.bed_limit_s)
@@ -249,10 +245,7 @@ class Driver:
             self._recorder.save(snapshot)
 
     def _window(self, session: Session) -> bool:
-        """Compute up to the next check, look at it, and record it where a record is due.
-
-        False where the bed has become too stiff for the step.
-        """
+        """Compute up to the next check, and record it; False where the bed became too stiff."""
         before, cost = session.steps, self.cost
         if session.stage.counts_as_vibration and cost.limit_moments < len(self._moments):
             self._find_limits(session)

@@ -2,19 +2,68 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterator
 from dataclasses import dataclass, replace
 from functools import cached_property
 
-from sandmould.engines.step_counts import StepCounts
+import numpy as np
+
+from sandmould.geometry.geometry import Array
 from sandmould.scenario.box import Piston
-from sandmould.scenario.discharge import FLOW_SETTLING, Discharge
-from sandmould.scenario.fill import FillVibration, Settling
+from sandmould.scenario.fill import FLOW_SETTLING, Discharge, FillVibration, Settling
 from sandmould.scenario.placement import PlannedLayer, plan_counts, plan_layer, portion_of
 from sandmould.scenario.scenario import Scenario
 from sandmould.scenario.stages import StageKind
 from sandmould.scenario.vibration import RestStage, VibrationStage
 from sandmould.sums import added
+
+SETUP_CHECKS = 20
+"""Checks after which LAMMPS and LIGGGHTS are set up anew, so that a checkpoint may be written."""
+
+
+@dataclass(frozen=True)
+class StepCounts:
+    """Steps between load samples, checks and records; each a multiple of the one before.
+
+    What is computed hangs on the first two alone.
+    """
+
+    step_s: float
+    load: int
+    check: int
+    record: int
+
+    @classmethod
+    def of(cls, scenario: Scenario) -> StepCounts:
+        """Round the intervals of a scenario."""
+        step = scenario.step_s
+        load = scenario.rest.load_every_steps
+        check = load * max(1, round(scenario.rest.check_every_s / step / load))
+        record = check * max(1, round(scenario.record.series_every_s / step / check))
+        return cls(step, load, check, record)
+
+    def steps(self, time_s: float) -> int:
+        """Whole steps that cover a time."""
+        return math.ceil(time_s / self.step_s * (1 - 1e-12))
+
+    def records(self, interval_s: float) -> int:
+        """Steps of an interval, rounded to whole records, at least one."""
+        return self.record * max(1, round(interval_s / self.step_s / self.record))
+
+    @property
+    def setup(self) -> int:
+        """Steps from one setup of LAMMPS or LIGGGHTS to the next, whatever is recorded."""
+        return self.check * SETUP_CHECKS
+
+    def checkpoints(self, interval_s: float, *, at_setups: bool) -> int:
+        """Steps of an interval, rounded to whole records and, if need be, to whole setups."""
+        whole = math.lcm(self.record, self.setup) if at_setups else self.record
+        return whole * max(1, round(interval_s / self.step_s / whole))
+
+    def vibration(self, stage: VibrationStage) -> int:
+        """Steps of a vibration stage, with one at rest at either end."""
+        return self.steps(stage.whole_duration_s) + 2
 
 
 @dataclass(frozen=True)
@@ -153,7 +202,6 @@ def _flow(scenario: Scenario, discharge: Discharge) -> Iterator[Stage]:
 
 
 def _pours(scenario: Scenario, counts: list[int]) -> Iterator[Stage]:
-    """Stages of the fill."""
     vibration, between = scenario.fill.vibration, scenario.fill.vibration_between_layers
     if vibration is not None:
         yield from _vibrated_pours(scenario, vibration, len(counts))
@@ -197,10 +245,7 @@ def _vibrated_pours(scenario: Scenario, vibration: FillVibration, layers: int) -
 
 
 def _box_stages(scenario: Scenario) -> Iterator[Stage]:
-    """Stages of vibration and rest after the fill, numbered by their place in the scenario.
-
-    The rest that follows the last vibration by default has no number.
-    """
+    """Stages of vibration and rest after the fill; a default rest after the last has no number."""
     planned: list[tuple[int, VibrationStage | RestStage]] = [*enumerate(scenario.vibration, 1)]
     if scenario.measure_at_rest and planned and isinstance(planned[-1][1], VibrationStage):
         longest_s = scenario.fill.settling.longest_s
@@ -239,3 +284,58 @@ def _rest_stage(
         stops_smoothly=stop_s > 0,
         vibration_steps=0 if moved is None else StepCounts.of(scenario).vibration(moved),
     )
+
+
+def displacements(stage: Stage, first: int, count: int, step_s: float) -> Array:
+    """Displacement of the box along its direction at some steps of a stage, (count,) float64, m.
+
+    ``first``: first step, counted from the stage's beginning.
+
+    The motion starts one step into the stage, as in the decks.
+    """
+    if stage.vibration is None:
+        return np.zeros(count)
+    steps = np.arange(first, first + count) + stage.vibration_steps
+    times: Array = (steps - 1) * np.float64(step_s)
+    return stage.vibration.displacements_at(times, stage.stops_smoothly)
+
+
+def start_of_grains(
+    scenario: Scenario, stage: Stage, steps: int, step_s: float
+) -> tuple[Array, Array]:
+    """Where and how fast grains begin that stand still while the box vibrates.
+
+    Returns
+    -------
+    shift_m : (d,) float64, m
+        From their place in the box to that in the frame of the computation.
+    velocity_m_s : (d,) float64, m/s
+        In the frame of the computation, half a step ago.
+    """
+    zero = np.zeros(scenario.dimension)
+    if stage.vibration is None:
+        return zero, zero
+    direction = np.array(stage.vibration.unit_direction(scenario.dimension))
+    before, now = displacements(stage, steps - 1, 2, step_s)
+    if scenario.frame == "box":
+        return zero, -(now - before) / step_s * direction
+    return now * direction, zero
+
+
+def box_motion(scenario: Scenario, stage: Stage, steps: int, step_s: float) -> tuple[Array, Array]:
+    """Displacement (d,) in m and velocity (d,) in m/s of the walls, zero in the box frame.
+
+    ``steps``: since the stage began.
+
+    Notes
+    -----
+    The motion starts one step into the stage, as in the decks; the velocity is that of the
+    discrete motion, half a step to either side.
+    """
+    d = scenario.dimension
+    vibration = stage.vibration
+    if scenario.frame == "box" or vibration is None:
+        return np.zeros(d), np.zeros(d)
+    direction = np.array(vibration.unit_direction(d))
+    before, now, after = displacements(stage, steps - 1, 3, step_s)
+    return now * direction, (after - before) / (2 * step_s) * direction

@@ -9,8 +9,7 @@ from typing import TextIO
 
 from sandmould.engines.guard import Health
 from sandmould.engines.session import Array
-from sandmould.engines.snapshot import Snapshot
-from sandmould.engines.snapshot_file import SnapshotFile
+from sandmould.engines.snapshot import Snapshot, SnapshotFile
 from sandmould.engines.table_periods import TablePeriod
 from sandmould.runs.checkpoint_folders import CheckpointMark
 from sandmould.runs.products import TABLE_PERIODS

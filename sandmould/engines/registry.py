@@ -11,21 +11,19 @@ from typing import Any, Protocol, assert_never
 from sandmould import ROOT, geometry
 from sandmould.bad_input import Problem
 from sandmould.digest import code_identity, digest
-from sandmould.engines.capabilities import Capabilities, Ranks
 from sandmould.engines.deck import Deck, dialect_hash, template_files
 from sandmould.engines.program import Program, build_program
-from sandmould.engines.session import RefusedError, SandSession
-from sandmould.scenario.checks.unbalance import unbalance_key
+from sandmould.engines.session import Capabilities, Ranks, RefusedError, SandSession
+from sandmould.scenario.checks.moving import moving_wall, unbalance_key
 from sandmould.scenario.engine import ENGINE_NAMES, DeckReader, EngineName
-from sandmould.scenario.moving_walls import moving_wall
 from sandmould.scenario.pattern import PatternDrawing
 from sandmould.scenario.scenario import Scenario
 from sandmould.scenario.solids import SolidMesh
 
 _OF_EVERY_ENGINE = (
-    "scenario/contact.py", "scenario/placement.py", "engines/program.py", "engines/step_counts.py",
-    "engines/box_motion.py", "engines/staged_session.py", "engines/deck_session.py",
-    "engines/driver.py", "engines/guard.py", "engines/bed_step.py",
+    "scenario/contact.py", "scenario/placement.py", "engines/program.py",
+    "engines/staged_session.py", "engines/deck_session.py", "engines/driver.py",
+    "engines/guard.py", "engines/bed_step.py",
 )  # fmt: skip
 """How hard sand is, where grains begin, how stages follow each other and end, what stops a run."""
 

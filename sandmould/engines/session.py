@@ -5,8 +5,9 @@ from __future__ import annotations
 import re
 from collections.abc import Mapping
 from dataclasses import dataclass
+from enum import Enum
 from pathlib import Path
-from typing import Any, Protocol, TypeVar
+from typing import Any, Literal, Protocol, TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
@@ -18,6 +19,43 @@ from sandmould.engines.table_periods import TablePeriod
 from sandmould.runs.outcome import Outcome
 
 Array = NDArray[np.float64]
+
+
+@dataclass(frozen=True)
+class Capabilities:
+    """Abilities of the sessions of one engine; see ``sandmould.engines.session.Session``.
+
+    A coupling asks for them and never for the engine's name.
+    """
+
+    bends_meshes: tuple[int, ...]
+    """Dimensions of the scenes in which ``move_surface`` takes a mesh to new vertices."""
+    bends_in_frames: tuple[Literal["box", "laboratory"], ...]
+    """Frames of reference in which it does."""
+    repeats_windows: bool = False
+    """Whether a window can be computed again from its checkpoint: ``save_checkpoint`` and
+    ``restore_checkpoint``."""
+    calls_movers: bool = False
+    """Whether ``attach_mover`` lets a surface be moved inside every step."""
+    loads_of_every_step: bool = False
+    """Whether ``vertex_loads`` are means over all steps, not over samples some steps apart, so
+    that a window may be as short as one step."""
+    checkpoints_at_setups: bool = False
+    """Whether a checkpoint forces a setup of the engine, so that it has to come with one."""
+    moves_tables: bool = False
+    """Whether the box can stand on a table that rotating masses, mounts and the sand move."""
+    moves_walls: bool = False
+    """Whether a gate opens in a stated time, and a wall of the box moves as a piston."""
+    changes_checks: bool = False
+    """Whether a session goes on from a checkpoint with checks at another interval."""
+
+
+class Ranks(Enum):
+    """How an engine shares the work of one run."""
+
+    PROCESSES = "MPI ranks, each a process"
+    THREADS = "threads of one process"
+    ONE = "one process without threads"
 
 
 @dataclass(frozen=True)
@@ -125,13 +163,8 @@ class Session(Protocol):
     def set_state(self, position_m: Array, velocity_m_s: Array, spin_rad_s: Array) -> None:
         """Place all grains now in the box exactly, without contact history.
 
-        Meant for verification: a stage must be started after it.
-
-        Parameters
-        ----------
-        position_m, velocity_m_s : (n, d) float64, m and m/s
-            In the order of ids.
-        spin_rad_s : (n, 3) float64, rad/s
+        Meant for verification: a stage must be started after it. ``position_m``, ``velocity_m_s``,
+        (n, d) float64, m and m/s: in the order of ids. ``spin_rad_s``: (n, 3) float64, rad/s.
         """
 
     def start_stage(self, stage: Stage) -> None:
@@ -157,10 +190,7 @@ class Session(Protocol):
     def surface_loads(self) -> Mapping[str, Array] | None:
         """Give the mean force of the sand on each wall and block over the last check.
 
-        Returns
-        -------
-        mapping of surface to (d,) float64, N, or None
-            None when the last advance did not end a check.
+        (d,) float64, N, by surface; None when the last advance did not end a check.
         """
 
     def table_periods(self) -> list[TablePeriod]:
@@ -171,11 +201,8 @@ class Session(Protocol):
 
         Dashpots are corrected for the limit itself; once the bed has given the step, for that.
 
-        Returns
-        -------
-        float, s
-            Limit of the whole system with its dashpots, eq. (42); infinite where nothing touches.
-            All contacts count as sticking, and none opens: the stiffest case.
+        Limit of the whole system with its dashpots, eq. (42); infinite where nothing touches. All
+        contacts count as sticking, and none opens: the stiffest case.
         """
 
     def write_checkpoint(self, folder: Path) -> None:
@@ -217,32 +244,17 @@ class SandSession(Session, Protocol):
 
         ``name``: a surface made of facets.
 
-        Returns
-        -------
-        (nv, d) float64, N, or None
-            None when no load was sampled since.
-
-        Raises
-        ------
-        RefusedError
+        (nv, d) float64, N; None when no load was sampled since. Raises RefusedError.
         """
 
     def move_surface(self, name: str, vertices_m: Array, window_s: float) -> None:
-        """Move a surface to new vertices over the next window, or refuse.
-
-        Raises
-        ------
-        RefusedError
-        """
+        """Move a surface to new vertices over the next window, or refuse. Raises RefusedError."""
 
     def save_checkpoint(self) -> Any:
         """Give all that is needed to compute on from here, in memory, or refuse.
 
-        For another iteration of a window; ``write_checkpoint`` is for another process.
-
-        Raises
-        ------
-        RefusedError
+        For another iteration of a window; ``write_checkpoint`` is for another process. Raises
+        RefusedError.
         """
 
     def restore_checkpoint(self, checkpoint: Any) -> None:
@@ -251,9 +263,5 @@ class SandSession(Session, Protocol):
     def attach_mover(self, name: str, mover: StepMover) -> None:
         """Let a surface be moved in every step by the loads on it, or refuse.
 
-        A session opened from a checkpoint is given it again.
-
-        Raises
-        ------
-        RefusedError
+        A session opened from a checkpoint is given it again. Raises RefusedError.
         """

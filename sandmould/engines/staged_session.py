@@ -15,12 +15,10 @@ from typing import Any, ClassVar, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from sandmould.engines.box_motion import box_motion
-from sandmould.engines.program import Program, Stage
+from sandmould.engines.program import Program, Stage, StepCounts, box_motion
 from sandmould.engines.rest import RestWatch
 from sandmould.engines.session import Array, RefusedError, Shared, StepMover
 from sandmould.engines.snapshot import Snapshot
-from sandmould.engines.step_counts import StepCounts
 from sandmould.engines.table_periods import TablePeriod
 from sandmould.scenario.fill import Settling
 from sandmould.scenario.stages import StageKind
@@ -111,10 +109,7 @@ class StagedSession(ABC):
 
     @abstractmethod
     def _vertex_sums(self, name: str) -> tuple[Array, int]:
-        """Sum of the loads on a surface's vertices over this check, and its number of samples.
-
-        Right after a check has ended: of the whole of that check.
-        """
+        """Sum of the loads on vertices over this check, or the one just ended, and its samples."""
 
     @abstractmethod
     def _save(self, folder: Path) -> None:
@@ -139,7 +134,6 @@ class StagedSession(ABC):
         return value
 
     def _stage_steps(self) -> int:
-        """Steps of the stage, at most."""
         return self.stage.longest_steps(self._counts)
 
     def start_stage(self, stage: Stage) -> None:
@@ -206,7 +200,6 @@ class StagedSession(ABC):
         self.at_rest = long_enough and self._watch.at_rest
 
     def _weight_n(self) -> float:
-        """Weight of all grains now in the box."""
         layers = bisect.bisect_right(list(accumulate(self._program.counts)), self.grains)
         return self._program.mass_kg(layers) * self._scenario.gravity_m_s2
 
@@ -219,11 +212,7 @@ class StagedSession(ABC):
         radius_m: Array,
         orientation: Array | None = None,
     ) -> Snapshot:
-        """Make a snapshot of all grains, relative to the box, out of what the engine computes with.
-
-        Ids ascend, and all other arrays follow them; places and velocities are given in the frame
-        of the computation.
-        """
+        """Make a snapshot relative to the box from arrays in the order of ids, in their frame."""
         shift, speed = self._box_motion()
         start = self._vibration_start
         shaken = self._stage_start if self.stage.kind is StageKind.REST else self.steps

@@ -65,10 +65,7 @@ def window_of(
 ) -> Window:
     """Accelerations and works of every step, which sum to the change of energy but for round-off.
 
-    Parameters
-    ----------
-    places_m : (steps + 2,) float64, m
-    times_s : (steps,) float64, s
+    ``places_m``: (steps + 2,) float64, m; ``times_s``: (steps,) float64, s.
     """
     before, now, after = places_m[:-2], places_m[1:-1], places_m[2:]
     way, speed = 0.5 * (after - before), 0.5 * (after - before) / step_s
@@ -101,12 +98,8 @@ class TablePeriods:
     ) -> list[TablePeriod]:
         """Take in a window; gives the periods that have ended in it.
 
-        Parameters
-        ----------
-        periods : int
-            Of the stage; steps after the last one are left out.
-        offset_s : float
-            Time of vibration when the stage began.
+        ``periods``: of the stage; steps after the last one are left out. ``offset_s``: time of
+        vibration when the stage began.
         """
         self.steps = np.concatenate([self.steps, np.column_stack(window)])
         number = np.floor(self.steps[:, 0] * frequency_hz + 1e-9).astype(np.int64)

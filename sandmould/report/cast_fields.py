@@ -12,15 +12,15 @@ from matplotlib.figure import Figure
 from matplotlib.layout_engine import ConstrainedLayoutEngine
 from numpy.typing import NDArray
 
-from sandmould.analysis.feeding import NIYAMA_LOW, CutOff, Feeding, Region, feeding, region_of
-from sandmould.analysis.freezing import Freezing, freezing
-from sandmould.analysis.freezing_plots import (
+from sandmould.analysis.casting_plots import (
     DistanceM,
     draw_freezing,
     draw_modulus,
     draw_niyama,
     draw_temperature,
 )
+from sandmould.analysis.feeding import NIYAMA_LOW, CutOff, Feeding, Region, feeding, region_of
+from sandmould.analysis.freezing import Freezing, freezing
 from sandmould.casting.arpm.scene import solids_of
 from sandmould.drawing.figures import png
 from sandmould.drawing.sphere_scene import SurfaceField, solid_scene

@@ -10,7 +10,7 @@ import pandas as pd
 import scipy
 from numpy.typing import NDArray
 
-from sandmould.analysis.filling import Limb, fit_limbs
+from sandmould.analysis.spectrum import Limb, fit_limbs
 from sandmould.definition.study import Study
 from sandmould.drawing.chart import Chart, Line, tints
 from sandmould.report.curves import are_on_a_scale, reported_lines, runs_by_setting

@@ -12,8 +12,8 @@ import numpy as np
 import pandas as pd
 from numpy.typing import NDArray
 
-from sandmould.analysis.layers import tube_shares
 from sandmould.analysis.plots import LAYER_COLOURS
+from sandmould.analysis.tube_fill import tube_shares
 from sandmould.bad_input import BadInputError
 from sandmould.drawing import figures
 from sandmould.drawing.animation import BENT_M, Film, make_film

@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 from matplotlib.figure import Figure
 
-from sandmould.analysis.freezing_plots import draw_part
+from sandmould.analysis.casting_plots import draw_part
 from sandmould.analysis.plots import LAYER_COLOURS
 from sandmould.bad_input import BadInputError, Problem
 from sandmould.casting.arpm.scene import solids_of

@@ -165,12 +165,8 @@ def cavity_grid(
 ) -> CavityGrid:
     """Lay a grid over a cavity.
 
-    Parameters
-    ----------
-    spacing_m : float, m
-        Longest edge of a cell; longer where there would be too many.
-    margin_m : float, m, optional
-        How far the grid goes beyond the box round the cavity.
+    ``spacing_m``: longest edge of a cell; longer where there would be too many. ``margin_m``: how
+    far the grid goes beyond the box round the cavity.
     """
     corners_m = cavity.space.corners()
     low_m = corners_m.min(axis=0) - margin_m

@@ -60,17 +60,10 @@ def steady_drive(
 ) -> BoxDrive | None:
     """The steady motion of a table on mounts.
 
-    Parameters
-    ----------
-    displacement_m, phase_deg : (p,) float64, m and degrees
-        Amplitude and lag of each period of the stage so far, from its first on.
-
-    Returns
-    -------
-    BoxDrive or None
-        Mean over the second half of the periods between the ramps, phases included: what changes
-        its phase from period to period is no motion of the drive's frequency. None where no period
-        so far had the full moment.
+    Mean over the second half of the periods between the ramps, phases included: what changes its
+    phase from period to period is no motion of the drive's frequency. None where no period so far
+    had the full moment. ``displacement_m``, ``phase_deg``, (p,) float64, m and degrees: amplitude
+    and lag of each period of the stage so far, from its first on.
     """
     ramp = stage.ramp_s * stage.frequency_hz
     begin = np.arange(len(displacement_m))

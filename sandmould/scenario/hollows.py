@@ -24,11 +24,7 @@ LEAST = 1e-4
 def hollows(vertices: Array, triangles: Ints) -> list[TriangleMesh]:
     """Spaces that a closed surface leaves free in its convex hull, the largest first.
 
-    Parameters
-    ----------
-    vertices : (nv, 3) float64
-    triangles : (nt, 3) int64
-        Seen from outside.
+    ``vertices``: (nv, 3) float64. ``triangles``, (nt, 3) int64: seen from outside.
 
     Raises
     ------

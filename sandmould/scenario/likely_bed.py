@@ -103,10 +103,8 @@ def _lattice(
 
 
 def _room_m(s: Scenario, position_m: Array, reach_m: float) -> Array:
-    """Distance of points from solids and from cavities, (n,) float64, m; below 0 inside.
-
-    Cavities are still empty when the box has been filled, so they hold grains off as solids do.
-    """
+    """Distance of points from solids and from cavities, (n,) float64, m; below 0 inside."""
+    # Cavities are still empty when the box has been filled, so they hold grains off as solids do.
     room_m = s.scene.clearance_m(position_m, reach_m)
     for bore in s.scene.bores:
         depth_m, across_m = bore.local(position_m)

@@ -17,9 +17,15 @@ from pydantic import BaseModel, ValidationError
 from sandmould.bad_input import BadInputError, Problem
 from sandmould.limits import YAML_BYTES
 from sandmould.plain_file import read_plain
-from sandmould.scenario.moved_keys import called, holds_anyway, instead_of
 from sandmould.scenario.quantity import units_at
-from sandmould.scenario.standing_keys import standing_keys, standing_kinds, standing_lengths
+from sandmould.scenario.standing_keys import (
+    called,
+    holds_anyway,
+    instead_of,
+    standing_keys,
+    standing_kinds,
+    standing_lengths,
+)
 from sandmould.scenario.units import in_kelvin, number_of
 from sandmould.scenario.yaml_text import fault_of, load_planned, load_users
 
@@ -117,11 +123,7 @@ def _is_sourced(value: Any) -> bool:
 
 
 def _starts_anew(value: Tree, below: Tree) -> bool:
-    """Whether a section excludes the one that it is laid over, whose keys go.
-
-    It states another kind; or either of two ways to hold a pattern is free, which no other goes
-    with.
-    """
+    """Whether a section excludes the one below it: another kind, or one of them is held free."""
     if "kind" in value and "kind" in below:
         return bool(value["kind"] != below["kind"])
     free = value.get("free"), below.get("free")
@@ -131,14 +133,8 @@ def _starts_anew(value: Tree, below: Tree) -> bool:
 def merge(base: Tree, extra: Tree, origin: Origin, file: str, above: str = "") -> Tree:
     """Lay one tree over another: mappings merge, lists, values and what excludes replace.
 
-    Parameters
-    ----------
-    base, extra : dict
-        A leaf may be written ``{value: ..., unit: ..., source: ...}``.
-    origin : Origin
-        Updated with the file and source of every leaf of ``extra``.
-    above : str
-        Key path of ``base``.
+    ``base``, ``extra``: a leaf may be written ``{value: ..., unit: ..., source: ...}``. ``origin``:
+    updated with the file and source of every leaf of ``extra``. ``above``: key path of ``base``.
     """
     merged = dict(base)
     for name, value in extra.items():

@@ -15,12 +15,10 @@ from sandmould.geometry.geometry import Scene
 from sandmould.scenario.box import Box, Obstacle, Piston, Plate, build_scene, piston_wall
 from sandmould.scenario.cavities import CavityKey, cavity_space
 from sandmould.scenario.contact import BackgroundDamping, Contact, springs_in_use
-from sandmould.scenario.discharge import Discharge
 from sandmould.scenario.engine import Engine
-from sandmould.scenario.fill import Fill
+from sandmould.scenario.fill import Discharge, Fill, Rest
 from sandmould.scenario.pattern import PatternConfig
 from sandmould.scenario.quantity import Section, quantity
-from sandmould.scenario.rest import Rest
 from sandmould.scenario.sand import ARGUED, Sand
 from sandmould.scenario.stages import StageKind, is_filling
 from sandmould.scenario.time_step import BED_FRACTION, CriticalStep, TimeStep, critical_step

@@ -140,10 +140,7 @@ def cylinder_along(
 ) -> Revolved:
     """Geometry of a cylinder about any axis.
 
-    Parameters
-    ----------
-    centre_m, axis : (3,) float64
-        Centre, m, and unit vector along the axis.
+    ``centre_m``, ``axis``, (3,) float64: centre, m, and unit vector along the axis.
     """
     half_m, radius_m = length_m / 2, diameter_m / 2
     profile_m = np.array([[-half_m, 0.0], [half_m, 0.0], [half_m, radius_m], [-half_m, radius_m]])
@@ -203,11 +200,7 @@ def drawn_surface(drawing: Drawing, key: str) -> tuple[Array, NDArray[np.int64]]
 def other_units(drawing: Drawing, size_m: Array, box_m: Array) -> list[tuple[float, str]]:
     """Units in which a drawing fits its box and is not lost in it, other than its own.
 
-    Parameters
-    ----------
-    size_m : (3,) float64, m
-        As read.
-    box_m : (3,) float64, m
+    ``size_m``, (3,) float64, m: as read. ``box_m``: (3,) float64, m.
     """
     if tells_unit(drawing.path):
         return []

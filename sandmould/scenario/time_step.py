@@ -62,14 +62,9 @@ def damped_step(omega_rad_s: float, damping_ratio: float, correction_per_s: floa
     """Critical step of one mode, eq. (42), h = omega dt: h^2 + 4 xi h = 4.
 
     Corrected dashpots, c' = c/(1 + b dt), are the weaker the longer the step that they are found
-    for: h^2 + 4 xi h/(1 + b h/omega) = 4.
-
-    Parameters
-    ----------
-    damping_ratio : float
-        xi of the mode, that of plain dashpots.
-    correction_per_s : float
-        b = c/(4 m) of its contacts with m of eq. (21), at most xi omega; 0 of plain dashpots.
+    for: h^2 + 4 xi h/(1 + b h/omega) = 4. ``damping_ratio``: xi of the mode, that of plain
+    dashpots. ``correction_per_s``: b = c/(4 m) of its contacts with m of eq. (21), at most xi
+    omega; 0 of plain dashpots.
     """
     xi, b = damping_ratio, correction_per_s / omega_rad_s
     if b == 0.0:
@@ -91,13 +86,10 @@ def _modes(
     pair_masses: int,
     corrected: bool,
 ) -> tuple[float, float]:
-    """Critical steps of the stiffest normal and rotational mode of equal grains.
-
-    With n contacts a grain the highest normal mode of a lattice has omega^2 = n k_n / m, its
-    share of critical damping is zeta omega / omega_pair with omega_pair^2 = 2 k_n / m (k_n / m at
-    a wall); the highest rotational one has omega^2 = 2 n k_T / (I / r^2) (n k_T at a wall), and
-    no damping, eqs. (50)-(54).
-    """
+    """Critical steps of the stiffest normal and rotational mode of equal grains, eqs. (50)-(54)."""
+    # With n contacts a grain the highest normal mode has omega^2 = n k_n / m and zeta omega /
+    # omega_pair of critical damping, omega_pair^2 = 2 k_n / m (k_n / m at a wall); the highest
+    # rotational one omega^2 = 2 n k_T / (I / r^2) (n k_T at a wall), and no damping.
     omega_n = math.sqrt(contacts * law.normal_stiffness_n_m / mass_kg)
     omega_pair = math.sqrt(pair_masses * law.normal_stiffness_n_m / mass_kg)
     inertia_kg = inertia_factor * mass_kg

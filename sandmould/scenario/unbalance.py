@@ -92,11 +92,8 @@ class Unbalance(Section):
     ) -> float:
         """Steady amplitude of the table without sand, or with a mass that moves with it.
 
-        Returns
-        -------
-        float, m
-            m e omega^2/|K - (M + m_added) omega^2 + i omega C|; infinite at a resonance without
-            damping.
+        m e omega^2/|K - (M + m_added) omega^2 + i omega C|; infinite at a resonance without
+        damping.
         """
         omega = angular_frequency_rad_s
         mass_kg = self.moving_mass_kg + added_mass_kg

@@ -189,19 +189,10 @@ class VibrationStage(Shaking):
     def displacements_at(
         self, time_s: NDArray[np.float64], stops_smoothly: bool = False
     ) -> NDArray[np.float64]:
-        """Displacement s(t) along the direction.
+        """Displacement s(t) along the direction, m.
 
-        Parameters
-        ----------
-        time_s : float64, s
-            Since the stage began.
-        stops_smoothly : bool
-            Whether the box stops smoothly after the stage, or dead at its end.
-
-        Returns
-        -------
-        float64, m
-            Zero before the stage, and once the box has stopped.
+        Zero before the stage, and once the box has stopped. ``time_s``: since the stage began.
+        ``stops_smoothly``: whether the box stops smoothly after the stage, or dead at its end.
         """
         return self._waves(self.amplitude_m, time_s, stops_smoothly)
 

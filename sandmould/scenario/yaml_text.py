@@ -41,7 +41,6 @@ class _Bounded(yaml.SafeLoader):
         self._depth = self._aliases = 0
 
     def compose_node(self, parent: Any, index: Any) -> yaml.Node | None:
-        """Compose a node and count it."""
         if self.check_event(yaml.AliasEvent):
             self._aliases += 1
             YAML_ALIASES.check("file", self._aliases)
@@ -89,10 +88,7 @@ def _strict(parser: Any) -> Any:
 
 
 def _as_in_yaml_1_2(loader: Any) -> Any:
-    """Let a loader read plain scalars by the core schema of YAML 1.2, and text that can be seen.
-
-    YAML 1.1, which PyYAML reads, takes 1:30 for 90, 010 for 8 and ``no`` for false.
-    """
+    """Let a loader read scalars as YAML 1.2: for 1.1 1:30 is 90, 010 is 8, ``no`` is false."""
     core = {
         "null": r"~|null|Null|NULL|",
         "bool": r"true|True|TRUE|false|False|FALSE",

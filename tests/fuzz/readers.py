@@ -79,20 +79,20 @@ def _checkpoint_mark(path: Path) -> object:
 
 
 def _snapshot(path: Path) -> object:
-    from sandmould.engines.snapshot_file import SNAPSHOTS, stored_snapshots
+    from sandmould.engines.snapshot import SNAPSHOTS, stored_snapshots
 
     path.replace(path.parent / SNAPSHOTS)
     return [stored.load() for stored in stored_snapshots(path.parent)]
 
 
 def _grains(path: Path) -> object:
-    from sandmould.engines.liggghts.grains_file import read_grains
+    from sandmould.engines.liggghts.process import read_grains
 
     return read_grains(path)
 
 
 def _stress(path: Path) -> object:
-    from sandmould.engines.liggghts.vtk_stress import read_triangle_loads
+    from sandmould.engines.liggghts.session import read_triangle_loads
 
     return read_triangle_loads(path)
 

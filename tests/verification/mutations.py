@@ -93,7 +93,7 @@ _FIELDS = (
     ("rolling_arm", "(30), (32)"),
     ("k_roll", "(29), regularised"),
 )
-LAW, KINDS, PAIRS = "contact_law.py", "kinds.py", "pairs.py"
+LAW, KINDS, PAIRS = "contact_law.py", "moving_state.py", "pairs.py"
 MOTION, STEPS = "motion.py", "steps.py"
 MUTATIONS = (
     *(

@@ -15,7 +15,7 @@ from sandmould.arrays import Floats
 from sandmould.casting.arpm import scene
 from sandmould.casting.arpm.cut import with_cut
 from sandmould.casting.arpm.elements import placed
-from sandmould.casting.arpm.faces import face_exchange
+from sandmould.casting.arpm.exchange import face_exchange
 from sandmould.casting.arpm.filling import Filling
 from sandmould.casting.arpm.material import ThermalMaterial
 from sandmould.casting.arpm.method import HeatMethod

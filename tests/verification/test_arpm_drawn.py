@@ -11,12 +11,12 @@ import pytest
 from scipy.spatial import ConvexHull
 
 from sandmould.arrays import Floats
+from sandmould.casting.arpm.computation import middle_frozen_s
 from sandmould.casting.arpm.cut import with_cut
 from sandmould.casting.arpm.cut_volume import LEAST_SHARE, held_of
 from sandmould.casting.arpm.elements import placed
-from sandmould.casting.arpm.faces import face_exchange
+from sandmould.casting.arpm.exchange import face_exchange
 from sandmould.casting.arpm.filling import Filling
-from sandmould.casting.arpm.front import middle_frozen_s
 from sandmould.casting.arpm.material import ThermalMaterial
 from sandmould.casting.arpm.method import HeatMethod
 from sandmould.casting.arpm.raster import Cut, Raster, painted

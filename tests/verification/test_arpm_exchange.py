@@ -6,16 +6,14 @@ import numpy as np
 import pytest
 
 from sandmould.casting.arpm.elements import Elements, placed
-from sandmould.casting.arpm.exchange import Exchange
-from sandmould.casting.arpm.faces import face_exchange
+from sandmould.casting.arpm.exchange import Exchange, face_exchange
 from sandmould.casting.arpm.filling import Filling
 from sandmould.casting.arpm.kernel import kernel_exchange
 from sandmould.casting.arpm.local_steps import LocalSteps
-from sandmould.casting.arpm.marching import ExplicitSteps, Substance
+from sandmould.casting.arpm.marching import ExplicitSteps, Substance, SuperSteps
 from sandmould.casting.arpm.material import ThermalMaterial
-from sandmould.casting.arpm.power_diagram import power_exchange
+from sandmould.casting.arpm.method import power_exchange
 from sandmould.casting.arpm.raster import Raster
-from sandmould.casting.arpm.super_steps import SuperSteps
 from tests.verification.castings.growth import grows_beyond_s
 
 CONDUCTIVITY = np.array([1.255, 29.3])

@@ -12,9 +12,9 @@ from scipy.optimize import brentq
 from scipy.special import erf, erfc, erfinv
 
 from sandmould.arrays import Floats
+from sandmould.casting.arpm.computation import gradient_k_m, middle_frozen_s
 from sandmould.casting.arpm.elements import placed
 from sandmould.casting.arpm.filling import Filling
-from sandmould.casting.arpm.front import gradient_k_m, middle_frozen_s
 from sandmould.casting.arpm.material import ThermalMaterial
 from sandmould.casting.arpm.method import HeatMethod
 from sandmould.casting.arpm.raster import Raster

@@ -20,9 +20,9 @@ from sandmould.pattern_fe.coupling.opening import open_coupled
 from sandmould.pattern_fe.coupling.shapes_file import SHAPES
 from sandmould.pattern_fe.scene import pattern_of, surroundings_of
 from sandmould.runs.outcome import Outcome
+from sandmould.scenario.fill import Rest
 from sandmould.scenario.pattern import Scheme
 from sandmould.scenario.reading import Origin, merge
-from sandmould.scenario.rest import Rest
 from sandmould.scenario.scenario import Scenario
 from tests.patterns import _one_thread, read_shapes  # noqa: F401
 from tests.workflow.runs import drive

@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
-from sandmould.dem import chunks as chunks_module
+from sandmould.dem import moving_state
 from sandmould.engines.program import build_program
 from sandmould.engines.session import EngineStop
 from sandmould.pattern_fe.coupling.contact_rows import ContactRows, shares_along
@@ -196,7 +196,7 @@ def test_a_stopped_session_goes_on_as_if_never_stopped(engine: str, tmp_path: Pa
 
 
 def test_threads_change_no_bit(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(chunks_module, "CHUNK", 8)
+    monkeypatch.setattr(moving_state, "CHUNK", 8)
     found = []
     for threads in (1, 2):
         session: Any = open_coupled(build_program(bed_scene()), tmp_path, tmp_path / "engine.log")

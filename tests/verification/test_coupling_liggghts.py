@@ -9,9 +9,8 @@ import numpy as np
 import pytest
 
 from sandmould.engines.driver import Driver
-from sandmould.engines.liggghts.bending_mesh import BendingMesh
 from sandmould.engines.liggghts.mesh_files import outline_strips
-from sandmould.engines.liggghts.vtk_stress import TriangleLoads
+from sandmould.engines.liggghts.session import BendingMesh, TriangleLoads
 from sandmould.pattern_fe.coupling.convergence_log import CONVERGENCE_LOG, read_convergence_log
 from sandmould.pattern_fe.coupling.interface import with_surface
 from sandmould.pattern_fe.coupling.loop_verdict import classify_loop

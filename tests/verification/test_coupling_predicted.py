@@ -9,9 +9,8 @@ from typing import Any
 import numpy as np
 import pytest
 
-from sandmould.engines.program import build_program
+from sandmould.engines.program import StepCounts, build_program
 from sandmould.engines.reference.session import ReferenceSession
-from sandmould.engines.step_counts import StepCounts
 from sandmould.pattern_fe.coupling.convergence_log import CONVERGENCE_LOG, read_convergence_log
 from sandmould.pattern_fe.coupling.foam_body import FoamBody
 from sandmould.pattern_fe.coupling.gain import measure_gain

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from sandmould.engines.guard import grain_masses_kg
-from sandmould.engines.liggghts.grains_file import read_grains
+from sandmould.engines.liggghts.process import read_grains
 from sandmould.engines.liggghts.session import LiggghtsSession
 from sandmould.engines.session import EngineStop, RefusedError, StepMover
 from sandmould.runs.outcome import Outcome

@@ -10,9 +10,8 @@ import pytest
 from scipy.spatial import cKDTree
 
 from sandmould.casting.mps.flow import Flow
-from sandmould.casting.mps.particles import Floats
+from sandmould.casting.mps.particles import Floats, make_kernel, weight
 from sandmould.casting.mps.scheme import LiquidMetal, Scheme
-from sandmould.casting.mps.weight import make_kernel, weight
 from tests.verification.castings.flows import (
     angular_momentum_m2_s,
     channel,

@@ -5,21 +5,29 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from sandmould.casting.mps.collisions import collisions
-from sandmould.casting.mps.flow import Flow
+from sandmould.casting.mps.flow import Flow, collisions
 from sandmould.casting.mps.neighbours import Neighbours, find_candidates, find_neighbours
 from sandmould.casting.mps.operators import (
     crowding,
     density_rate,
     divergence,
+    fitted_laplacian,
     laplacian,
     pressure_gradient,
     velocity_gradient,
 )
-from sandmould.casting.mps.particles import FLUID, WALL, Particles, at_rest, lattice
+from sandmould.casting.mps.particles import (
+    FLUID,
+    WALL,
+    Kernel,
+    Particles,
+    at_rest,
+    lattice,
+    make_kernel,
+    weight,
+    weight_slope,
+)
 from sandmould.casting.mps.scheme import LiquidMetal, Scheme
-from sandmould.casting.mps.viscosity import fitted_laplacian
-from sandmould.casting.mps.weight import Kernel, make_kernel, weight, weight_slope
 
 SIZE_M = 2e-3
 SLOPE = np.array([3.0, -2.0, 1.5])

@@ -8,11 +8,11 @@ import numpy as np
 import pytest
 
 from sandmould.casting.mps.flow import Flow, FlowGuard
+from sandmould.casting.mps.particles import make_kernel
 from sandmould.casting.mps.probes import Watch, pressure_at
+from sandmould.casting.mps.scene import still_tank
 from sandmould.casting.mps.scheme import Scheme
 from sandmould.casting.mps.shoulder import HOP_SPEED_M_S, PAPERS, Ladle, open_shoulder, ring_m
-from sandmould.casting.mps.tank import still_tank
-from sandmould.casting.mps.weight import make_kernel
 from tests.verification.castings.still_fluid import ideal_pa, run_still
 
 SIZE_M = 2e-3

@@ -17,8 +17,7 @@ from sandmould.definition.run import Run
 from sandmould.engines.driver import Driver
 from sandmould.engines.program import Program, build_program
 from sandmould.engines.registry import engine_of
-from sandmould.engines.snapshot import Snapshot
-from sandmould.engines.snapshot_file import stored_snapshots
+from sandmould.engines.snapshot import Snapshot, stored_snapshots
 from sandmould.execution.jobs import compute_batch
 from sandmould.execution.pool import do, start_server
 from sandmould.execution.simulate import render_run

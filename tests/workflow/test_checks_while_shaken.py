@@ -10,8 +10,8 @@ import pandas as pd
 import pytest
 
 from sandmould.definition.run import Run
+from sandmould.engines.program import StepCounts
 from sandmould.engines.registry import engine_problem
-from sandmould.engines.step_counts import StepCounts
 from sandmould.kinds.sand.kind import SAND
 from sandmould.runs.hashing import scenario_hash
 from sandmould.runs.outcome import Outcome

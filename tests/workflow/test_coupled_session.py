@@ -11,10 +11,9 @@ import pandas as pd
 import pytest
 from numpy.typing import NDArray
 
-from sandmould.engines.program import build_program
+from sandmould.engines.program import StepCounts, build_program
 from sandmould.engines.reference.session import ReferenceSession
 from sandmould.engines.session import EngineStop, Session
-from sandmould.engines.step_counts import StepCounts
 from sandmould.pattern_fe.coupling.body import StaticSolution
 from sandmould.pattern_fe.coupling.convergence_log import CONVERGENCE_LOG, read_convergence_log
 from sandmould.pattern_fe.coupling.session import CoupledSession

@@ -17,7 +17,7 @@ from typing import Any
 import pytest
 
 from sandmould.definition.run import Run
-from sandmould.engines.snapshot_file import stored_snapshots
+from sandmould.engines.snapshot import stored_snapshots
 from sandmould.execution.jobs import JobError, do_job
 from sandmould.execution.locks import is_locked
 from sandmould.execution.pool import LOADED_FIRST, start_server

@@ -15,7 +15,7 @@ import pytest
 from sandmould.engines.guard import grain_masses_kg
 from sandmould.engines.program import build_program
 from sandmould.engines.session import RefusedError, StepMover
-from sandmould.engines.snapshot_file import stored_snapshots
+from sandmould.engines.snapshot import stored_snapshots
 from sandmould.execution.jobs import compute_run
 from sandmould.execution.locks import computing
 from sandmould.runs.outcome import Outcome, RunOutcome

@@ -12,7 +12,7 @@ import pytest
 from sandmould.engines.program import build_program
 from sandmould.engines.reference.session import ReferenceSession
 from sandmould.engines.session import RefusedError, StepMover
-from sandmould.engines.snapshot_file import stored_snapshots
+from sandmould.engines.snapshot import stored_snapshots
 from sandmould.execution.simulate import RESTARTABLE_EXIT
 from sandmould.runs.outcome import Outcome, RunOutcome
 from sandmould.runs.run_tables import read_costs

@@ -11,7 +11,7 @@ import pytest
 from sandmould import ROOT
 from sandmould.engines.driver import Driver
 from sandmould.engines.program import build_program
-from sandmould.engines.snapshot_file import stored_snapshots
+from sandmould.engines.snapshot import stored_snapshots
 from sandmould.execution.simulate import RESTARTABLE_EXIT
 from sandmould.runs.checkpoint_folders import newest_checkpoint
 from sandmould.runs.hashing import scenario_hash

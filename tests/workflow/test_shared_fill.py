@@ -18,7 +18,7 @@ import pytest
 import yaml
 
 from sandmould.definition.run import Run
-from sandmould.engines.snapshot_file import stored_snapshots
+from sandmould.engines.snapshot import stored_snapshots
 from sandmould.execution.again import _failed_fill
 from sandmould.execution.jobs import compute_run
 from sandmould.execution.packs.pack import pack

@@ -41,17 +41,8 @@ class Held:
 def held_of(raster: Raster, solids: Sequence[Body]) -> Held:
     """Of each cell that which lies in the casting, and where.
 
-    Parameters
-    ----------
-    raster : Raster
-        Painted with the solids.
-    solids : sequence of Body
-
-    Returns
-    -------
-    Held
-        Counted at points in each cell beside one of the other material; shares of 0 or 1 and no
-        lever in all others.
+    Counted at points in each cell beside one of the other material; shares of 0 or 1 and no lever
+    in all others. ``raster``: painted with the solids.
     """
     casting = raster.material == CASTING
     near = maximum_filter(casting, 3, mode="nearest") & ~minimum_filter(casting, 3, mode="nearest")
@@ -74,12 +65,9 @@ def held_of(raster: Raster, solids: Sequence[Body]) -> Held:
 
 
 def _even_points(cells: Ints, d: int) -> Floats:
-    """Points spread evenly over a unit square or cube for each of some cells, (c, k, d) float64.
-
-    Additive recurrence of the root of x^(d+1) = x + 1 (Roberts, "The unreasonable effectiveness of
-    quasirandom sequences", 2018): no rows that lie on a slope all at once. It goes on from cell to
-    cell, for a slope may cut all cells alike.
-    """
+    """Points spread evenly over a unit square or cube for each of some cells, (c, k, d) float64."""
+    # Additive recurrence of the root of x^(d+1) = x + 1 (Roberts, 2018): no rows that lie on a
+    # slope all at once. It goes on from cell to cell, for a slope may cut all cells alike.
     root = 2.0
     for _ in range(60):
         root = (1.0 + root) ** (1.0 / (d + 1))
@@ -96,23 +84,19 @@ def inside_any(solids: Sequence[Body], place_m: Floats) -> Flags:
 
 
 def volumes(casting: Flags, held: Held, between: tuple[Ints, Ints], area: Floats) -> Floats:
-    """What each cell counts for over its own volume.
+    """What each cell counts for over its own volume, (n,) float64.
+
+    The sum over each material is the drawing's, and so is that of volume times place, but where a
+    wall is too thin to share with a next cell or a cell has least to give.
 
     Parameters
     ----------
     casting : (nx, ny) or (nx, ny, nz) bool
         Whether a cell is of the casting.
-    held : Held
     between : two of (f,) int64
         Cells on the low and on the high side of the faces between unlike materials.
     area : (f,) float64
         Of the drawn surface at each of them.
-
-    Returns
-    -------
-    (n,) float64
-        The sum over each material is the drawing's, and so is that of volume times place, but
-        where a wall is too thin to share with a next cell or a cell has least to give.
     """
     own = np.where(casting.reshape(-1), held.share, 1.0 - held.share)
     # never so much that less than the least is left
@@ -159,11 +143,9 @@ def _places(cells: Ints, casting: Flags) -> Floats:
 
 
 def _levelled(casting: Flags, volume: Floats, lever: Floats) -> Floats:
-    """Share what lies off the centres with the next cells of the same material, by the lever rule.
-
-    Where both neighbours along an axis are of the same material, one loses half and the other gains
-    half; at a surface the cell itself stands for the one that is not there.
-    """
+    """Share what lies off the centres with next cells of the same material, by the lever rule."""
+    # With both neighbours along an axis one loses half and the other gains half; at a surface the
+    # cell itself stands for the one that is not there.
     number, flat = np.arange(casting.size).reshape(casting.shape), casting.reshape(-1)
     moves = []
     for axis in range(casting.ndim):

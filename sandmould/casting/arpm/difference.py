@@ -58,13 +58,10 @@ class DifferenceSteps:
 
         Parameters
         ----------
-        raster : Raster
-        table : EnthalpyTable
         conductivity_w_m_k : (m,) float64, W/m/K
         resistance_m2k_w : float or (m, m) float64, m2 K/W
         share : float
             Of the longest stable step.
-        threads : int
         """
         # a plane is a box of one layer
         shape = (1,) * (3 - raster.material.ndim) + raster.material.shape

@@ -133,11 +133,9 @@ def _pixel_edges(body: Pixels) -> tuple[Floats, Floats]:
 
 
 def _slopes(body: Pixels) -> Pieces:
-    """Edges between dark and light pixels, each as long as the slope that it is a step of.
-
-    Steps across axis a make |n_a| of the length of a line of normal n. With |n_a| of their own
-    length they add up to the line's, for n_x^2 + n_y^2 = 1.
-    """
+    """Edges between dark and light pixels, each as long as the slope that it is a step of."""
+    # Steps across axis a make |n_a| of a line of normal n; with |n_a| of their own length they add
+    # up to the line's, for n_x^2 + n_y^2 = 1.
     dark = np.pad(body.distance_in_pixels < 0.0, 1)
     smooth = gaussian_filter(np.pad(dark, 8).astype(np.float64), SMOOTH_PIXELS)
     across, up = np.gradient(smooth)

@@ -73,19 +73,10 @@ class Elements:
 def placed(raster: Raster, layers: Sequence[int] = ()) -> Elements:
     """Replace cells by elements of twice, four times ... their size away from interfaces.
 
-    Parameters
-    ----------
-    raster : Raster
-        Its cells are the small elements.
-    layers : sequence of int
-        One for each doubling: how many layers of the smaller size stay between the doubled
-        elements and the interface of materials or, from the second on, the next smaller size.
-        Empty for elements of one size; 0 doubles wherever a block is of one material.
-
-    Returns
-    -------
-    Elements
-        In C order of their low corners.
+    In C order of their low corners. ``raster``: its cells are the small elements. ``layers``: one
+    for each doubling: how many layers of the smaller size stay between the doubled elements and the
+    interface of materials or, from the second on, the next smaller size. Empty for elements of one
+    size; 0 doubles wherever a block is of one material.
 
     Raises
     ------

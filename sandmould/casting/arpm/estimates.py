@@ -96,7 +96,6 @@ def _surface_m2(raster: Raster, mask: Flags) -> Floats:
 
 
 def _away2(place: Any, centre: Ints) -> Any:
-    """Squared distances of cells from one of them."""
     return sum((line - at) ** 2 for line, at in zip(place, centre, strict=True))
 
 
@@ -160,17 +159,8 @@ def least_sand_share(scenario: Solidification, it: Cooled) -> float:
 def freezes_s(scenario: Solidification, it: Cooled, depth_m: float = math.inf) -> float:
     """When the thickest place of a casting is solid.
 
-    Parameters
-    ----------
-    scenario : Solidification
-    it : Cooled
-    depth_m : float, m
-        Sand before the box ends; unbounded unless given.
-
-    Returns
-    -------
-    float, s
-        Infinite where that sand cannot take the heat.
+    Infinite where that sand cannot take the heat. ``depth_m``: sand before the box ends; unbounded
+    unless given.
     """
     need_j_m2 = heat_to_lose_j_m3(scenario) * it.modulus_m
     if not math.isfinite(need_j_m2) or need_j_m2 >= sand_takes_j_m3(scenario) * depth_m:
@@ -209,11 +199,8 @@ def plate_modulus_m(scenario: Solidification, frozen_s: Floats) -> Floats:
 
 
 def _lacks_j_m2(scenario: Solidification, it: Cooled, depth_m: float, time_s: float) -> float:
-    """Heat that the casting has still to lose through its surface before its middle is solid.
-
-    By then its skin is colder than the solidus: on the average half of what drives the heat at that
-    time through the metal.
-    """
+    """Heat that the casting has still to lose through its surface before its middle is solid."""
+    # By then its skin is colder than the solidus, on average by half of what drives the heat.
     metal, poured_k = scenario.casting, scenario.initial_k.casting
     taken = taken_j_m2(scenario, it, depth_m, time_s)
     flux_w_m2 = (taken_j_m2(scenario, it, depth_m, (1.0 + _LATER) * time_s) - taken) / (

@@ -25,29 +25,17 @@ enthalpy but is no more consistent at a jump of sizes."""
 def weight(distance_m: Floats, reach_m: Floats) -> Floats:
     """Weight of a pair, eq. (3): reach over distance less 1, and 0 beyond the reach.
 
-    Parameters
-    ----------
-    distance_m, reach_m : (p,) float64, m
+    ``distance_m``, ``reach_m``: (p,) float64, m.
     """
     return np.asarray(np.maximum(reach_m / distance_m - 1.0, 0.0))
 
 
 def volume_weight(distance_m: Floats, own_m: Floats, other_m: Floats, kernel_size: float,
                   dimensions: int, form: Form = "corrected") -> Floats:  # fmt: skip
-    """Weight w_ij of a pair by the elements' volumes, eq. (4).
+    """Weight w_ij of a pair by the elements' volumes, eq. (4), (p,) float64.
 
-    Parameters
-    ----------
-    distance_m, own_m, other_m : (p,) float64, m
-        Distance, size of element i and size of element j.
-    kernel_size : float
-        c_k.
-    dimensions : int
-    form : Form
-
-    Returns
-    -------
-    (p,) float64
+    ``distance_m``, ``own_m``, ``other_m``, (p,) float64, m: distance, size of element i and size of
+    element j. ``kernel_size``: c_k.
     """
     ratio = (other_m / own_m) ** dimensions
     second = ratio if form == "printed" else 1.0
@@ -114,14 +102,12 @@ def kernel_exchange(elements: Elements, conductivity_w_m_k: Floats,
 
     Parameters
     ----------
-    elements : Elements
     conductivity_w_m_k : (m,) float64, W/m/K
         Of each material.
     resistance_m2k_w : float or (m, m) float64, m2 K/W
         As of ``resistances``.
     kernel_size : float
         c_k; the paper takes 2.1 and tries 1.4 to 4.2.
-    form : Form
     refuse_ratio : bool
         Whether elements smaller than 1/c_k of one within whose reach they lie are refused
         (section 4.3.2); the paper's cases 2-3A and small c_k break that rule.
@@ -160,9 +146,7 @@ def kernel_exchange(elements: Elements, conductivity_w_m_k: Floats,
 def check_sizes(elements: Elements, kernel_size: float) -> None:
     """Refuse elements smaller than 1/c_k of one within whose reach they lie (section 4.3.2).
 
-    Raises
-    ------
-    ValueError
+    Raises ValueError.
     """
     own, other, _ = neighbours(elements, kernel_size)
     _check_ratio(elements.size_m[own], elements.size_m[other], kernel_size)

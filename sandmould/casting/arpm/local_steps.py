@@ -17,13 +17,7 @@ from numba import prange, set_num_threads
 
 from sandmould.arrays import Floats, Ints
 from sandmould.casting.arpm.exchange import Exchange
-from sandmould.casting.arpm.marching import (
-    STEP_SHARE,
-    Heat,
-    HeatSystem,
-    Substance,
-    note,
-)
+from sandmould.casting.arpm.marching import STEP_SHARE, Heat, HeatSystem, Substance, note
 from sandmould.casting.arpm.material import temperature_of
 from sandmould.casting.arpm.varying import VaryingFaces, changed
 from sandmould.compiled import njit
@@ -58,15 +52,8 @@ class LocalSteps:
     ) -> None:
         """Sort the elements by their steps.
 
-        Parameters
-        ----------
-        exchange : Exchange
-        substance : Substance
-        share : float
-            Of each element's longest stable step.
-        most_levels : int
-            Elements never step more than 2 to this power less one times as long as others.
-        threads : int
+        ``share``: of each element's longest stable step. ``most_levels``: elements never step more
+        than 2 to this power less one times as long as others.
         """
         limit_s = share * exchange.limit_s(substance.capacity_j_m3_k)
         self._shortest_s = float(limit_s.min())
@@ -214,10 +201,7 @@ def _local_steps(
     begin: int, stop: int, dt: float, time_s: float, levels: Levels, system: HeatSystem,
     integral: Floats, enthalpy: Floats, temperature: Floats, noted: Floats, new: Floats,
 ) -> None:  # fmt: skip
-    """Take the shortest steps from one to another, both ends of cycles of 2^(levels - 1).
-
-    There all integrals are 0.
-    """
+    """Take shortest steps between two ends of cycles of 2^(levels - 1), where integrals are 0."""
     end = levels.end
     for at in range(begin + 1, stop + 1):
         highest = 0

@@ -148,14 +148,7 @@ class EnthalpyTable:
     def enthalpy_j_m3(self, temperature_k: Floats, material: Ints) -> Floats:
         """Enthalpy of elements; one on an isothermal front (solidus = liquidus) is liquid.
 
-        Parameters
-        ----------
-        temperature_k : (n,) float64, K
-        material : (n,) int64
-
-        Returns
-        -------
-        (n,) float64, J/m3
+        Gives (n,) float64, J/m3. ``temperature_k``: (n,) float64, K; ``material``: (n,) int64.
         """
         if self.rows.shape[1] > HEAD:
             found = np.empty(len(temperature_k))
@@ -188,16 +181,9 @@ def enthalpy_table(
 ) -> EnthalpyTable:
     """Tabulate materials.
 
-    Parameters
-    ----------
-    materials : sequence of Material
-    reference_k : float, K
-        Where the enthalpy is 0: the coldest initial temperature, so that drift is counted against
-        the heat that is there to be lost.
-    hottest_k : float, K
-        To where curves are tabulated.
-    read_at : float
-        Solid fraction at which gradients are read.
+    ``reference_k``: where the enthalpy is 0: the coldest initial temperature, so that drift is
+    counted against the heat that is there to be lost. ``hottest_k``: to where curves are tabulated.
+    ``read_at``: solid fraction at which gradients are read.
     """
     plain = all(it.is_plain for it in materials)
     hottest_k = max([hottest_k, *(it.liquidus_k for it in materials if it.melts)])

@@ -93,14 +93,8 @@ def painted(low_m: Floats, high_m: Floats, cell_m: float, solids: Mapping[int, B
 
     Where solids overlap, the last one has the place. A side of the box that is no multiple of the
     cells grows to the next one: at its high end, or at the low one where a solid touches the high.
-
-    Parameters
-    ----------
-    low_m, high_m : (d,) float64, m
-        Corners of the box.
-    cell_m : float, m
-    solids : mapping of material to Body
-        Outlines in 2D, meshes in 3D; material 0 is the mould round them.
+    ``low_m``, ``high_m``, (d,) float64, m: corners of the box. ``solids``: outlines in 2D, meshes
+    in 3D; material 0 is the mould round them.
 
     Raises
     ------

@@ -276,10 +276,7 @@ def expected_s(scenario: Solidification) -> float:
 
     As :func:`sandmould.casting.arpm.estimates.freezes_s`, with the sand that the box holds.
 
-    Returns
-    -------
-    float, s
-        Not beyond the time at which the run is stopped.
+    Not beyond the time at which the run is stopped.
     """
     it = cooled_of(scenario)
     return min(freezes_s(scenario, it, it.sand_depth_m), scenario.until_s)

@@ -10,8 +10,7 @@ from numpy.typing import NDArray
 from scipy.spatial import cKDTree
 
 from sandmould.arrays import Floats, Ints
-from sandmould.casting.mps.particles import DUMMY, Kinds
-from sandmould.casting.mps.weight import INLINED, OPTIONS, Kernel, weight
+from sandmould.casting.mps.particles import DUMMY, INLINED, OPTIONS, Kernel, Kinds, weight
 from sandmould.compiled import njit
 
 SKIN = 0.35
@@ -76,15 +75,7 @@ def _both_ways(n: int, pair: Ints, kind: Kinds) -> tuple[Ints, NDArray[np.uint32
 
 
 def find_candidates(kernel: Kernel, position_m: Floats, kind: Kinds) -> VerletList:
-    """List candidates.
-
-    Parameters
-    ----------
-    kernel : Kernel
-    position_m : (n, 3) float64, m
-        Finite.
-    kind : (n,) int8
-    """
+    """List candidates. ``position_m``, (n, 3) float64, m: finite. ``kind``: (n,) int8."""
     period = np.asarray(kernel.period_m)
     cyclic = period > 0.0
     wrapped = position_m.copy()
@@ -125,7 +116,6 @@ def find_neighbours(
 
     Parameters
     ----------
-    kernel : Kernel
     listed : VerletList
         Not old.
     position : (n, 3) float64, m

@@ -12,8 +12,16 @@ import math
 import numpy as np
 
 from sandmould.casting.mps.neighbours import Neighbours
-from sandmould.casting.mps.particles import DUMMY, FLUID, Floats, Kinds
-from sandmould.casting.mps.weight import INLINED, OPTIONS, Kernel, weight_slope
+from sandmould.casting.mps.particles import (
+    DUMMY,
+    FLUID,
+    INLINED,
+    OPTIONS,
+    Floats,
+    Kernel,
+    Kinds,
+    weight_slope,
+)
 from sandmould.compiled import njit
 
 LEAST, DIFFERENCE, SUM, CORRECTED, PRINTED = range(5)
@@ -35,6 +43,9 @@ GRADIENTS = {
 """
 SMALLEST_MOMENT = 0.02
 """Determinant of the moment matrix, 1 on the lattice, below which it is not inverted."""
+WORST_FIT = 1e-3
+"""Smallest over largest eigenvalue of a fit's matrix below which its particle keeps (4); 0.02 on
+the lattice, less where neighbours hardly span the space."""
 
 
 @njit(**INLINED)
@@ -54,15 +65,7 @@ def density_rate(kernel: Kernel, near: Neighbours, velocity: Floats) -> Floats:
 
     The source of higher order, HS (Khayyer and Gotoh 2009).
 
-    Parameters
-    ----------
-    kernel : Kernel
-    near : Neighbours
-    velocity : (n, 3) float64, m/s
-
-    Returns
-    -------
-    (n,) float64, 1/s
+    Gives (n,) float64, 1/s. ``velocity``: (n, 3) float64, m/s.
     """
     rate = np.zeros(len(velocity))
     for i in range(len(velocity)):
@@ -88,18 +91,8 @@ def divergence(kernel: Kernel, near: Neighbours, velocity: Floats) -> Floats:
 def laplacian(kernel: Kernel, near: Neighbours, field: Floats, kind: Kinds) -> Floats:
     """Laplacian of a vector field at the fluid's particles, eq. (4) with its sign turned.
 
-    Parameters
-    ----------
-    kernel : Kernel
-    near : Neighbours
-    field : (n, 3) float64
-        Also on walls and dummies.
-    kind : (n,) int8
-
-    Returns
-    -------
-    (n, 3) float64, the field's unit over m2
-        0 on walls and dummies.
+    Gives (n, 3) float64, the field's unit over m2; 0 on walls and dummies. ``field``,
+    (n, 3) float64: also on walls and dummies. ``kind``: (n,) int8.
     """
     result = np.zeros_like(field)
     factor = 2.0 * kernel.dimension / kernel.lattice_density
@@ -180,22 +173,17 @@ def _corrected(kernel: Kernel, near: Neighbours, kind: Kinds, gradient: Floats) 
 def pressure_gradient(
     kernel: Kernel, near: Neighbours, pressure: Floats, kind: Kinds, form: str
 ) -> Floats:
-    """Gradient of the pressure at the fluid's particles, eq. (3).
+    """Gradient of the pressure at the fluid's particles, eq. (3), (n, 3) float64, Pa/m.
+
+    0 on walls and dummies.
 
     Parameters
     ----------
-    kernel : Kernel
-    near : Neighbours
     pressure : (n,) float64, Pa
         Of fluid and walls; dummies have none.
     kind : (n,) int8
     form : str
         One of ``GRADIENTS``.
-
-    Returns
-    -------
-    (n, 3) float64, Pa/m
-        0 on walls and dummies.
     """
     gradient = _gradient(kernel, near, pressure, kind, GRADIENTS[form])
     if form != "corrected":
@@ -226,17 +214,8 @@ def velocity_gradient(kernel: Kernel, near: Neighbours, velocity: Floats, kind: 
 
     As the corrected gradient of the pressure; dummies are left out.
 
-    Parameters
-    ----------
-    kernel : Kernel
-    near : Neighbours
-    velocity : (n, 3) float64, m/s
-    kind : (n,) int8
-
-    Returns
-    -------
-    (n, 3, 3) float64, 1/s
-        At [i, a, b]; 0 on dummies.
+    Gives (n, 3, 3) float64, 1/s; at [i, a, b]; 0 on dummies. ``velocity``: (n, 3) float64, m/s;
+    ``kind``: (n,) int8.
     """
     return _corrected(kernel, near, kind, _velocity_differences(kernel, near, velocity, kind))
 
@@ -245,16 +224,8 @@ def velocity_gradient(kernel: Kernel, near: Neighbours, velocity: Floats, kind: 
 def crowding(kernel: Kernel, near: Neighbours, kind: Kinds) -> Floats:
     """Gradient of the concentration of particles, d/n0 sum of r_ij w / r^2; 0 on a lattice.
 
-    Parameters
-    ----------
-    kernel : Kernel
-    near : Neighbours
-    kind : (n,) int8
-
-    Returns
-    -------
-    (n, 3) float64, 1/m
-        0 on walls and dummies, which count as neighbours.
+    Gives (n, 3) float64, 1/m; 0 on walls and dummies, which count as neighbours. ``kind``:
+    (n,) int8.
     """
     result = np.zeros((len(kind), 3))
     factor = kernel.dimension / kernel.lattice_density
@@ -264,3 +235,61 @@ def crowding(kernel: Kernel, near: Neighbours, kind: Kinds) -> Floats:
                 for a in range(3):
                     result[i, a] += factor * near.share[k] * near.away_m[k, a]
     return result
+
+
+@njit(**INLINED)
+def _set_terms(kernel: Kernel, away_m: Floats, term: Floats) -> None:
+    """Terms of a quadratic field at a neighbour: x, x^2/2, then the products of two axes."""
+    d = kernel.dimension
+    last = 2 * d
+    for a in range(d):
+        x = away_m[a] / kernel.spacing_m
+        term[a] = x
+        term[d + a] = 0.5 * x * x
+        for b in range(a + 1, d):
+            term[last] = x * away_m[b] / kernel.spacing_m
+            last += 1
+
+
+@njit(**OPTIONS)
+def _fits(kernel: Kernel, near: Neighbours, field: Floats, kind: Kinds) -> tuple[Floats, Floats]:
+    """Normal equations of a quadratic field round each particle, distances over the spacing."""
+    d = kernel.dimension
+    size = d + d * (d + 1) // 2
+    matrix = np.zeros((len(kind), size, size))
+    right = np.zeros((len(kind), size, 3))
+    term = np.empty(size)
+    for i in np.flatnonzero(kind == FLUID):
+        for k in range(near.start[i], near.start[i + 1]):
+            j = near.other[k]
+            # an unknown value weighs nothing
+            share = near.share[k] * kernel.spacing_m**2 * (kind[j] != DUMMY)
+            _set_terms(kernel, near.away_m[k], term)
+            for a in range(size):
+                for b in range(size):
+                    matrix[i, a, b] += share * term[a] * term[b]
+                for b in range(3):
+                    right[i, a, b] += share * term[a] * (field[j, b] - field[i, b])
+    return matrix, right
+
+
+def fitted_laplacian(kernel: Kernel, near: Neighbours, field: Floats, kind: Kinds) -> Floats:
+    """Laplacian by least squares, exact for a quadratic field on any positions.
+
+    After Tamai and Koshizuka (2014), without the derivative's own weight. Dummies are left out:
+    they carry the mould's velocity, which does not go on beyond its surface. Arguments and result
+    as ``laplacian``; as that where too few neighbours span the space.
+    """
+    laplacians = laplacian(kernel, near, field, kind)
+    matrix, right = _fits(kernel, near, field, kind)
+    values = np.linalg.eigvalsh(matrix)
+    good = values[:, 0] > WORST_FIT * values[:, -1]
+    d = kernel.dimension
+    fitted = np.linalg.solve(matrix[good], right[good])[:, d : 2 * d]
+    laplacians[good] = fitted.sum(axis=1) / kernel.spacing_m**2
+    return laplacians
+
+
+LAPLACIANS = {"lattice": laplacian, "fitted": fitted_laplacian}
+"""Of the velocity. ``lattice`` is (4), exact on the lattice alone: rows that slide past each other
+see 4 % too little viscosity at c_k = 2.1 (mean over their phases; 1.0 % at 3.1, 0.6 % at 4)."""

@@ -8,22 +8,13 @@ import numpy as np
 
 from sandmould.arrays import Floats, Ints
 from sandmould.casting.mps.flow import Flow
-from sandmould.casting.mps.particles import DUMMY
-from sandmould.casting.mps.weight import weight
+from sandmould.casting.mps.particles import DUMMY, weight
 
 
 def pressure_at(flow: Flow, place_m: Floats) -> Floats:
     """Pressure at places: the mean of fluid and walls around, weighted by eq. (1).
 
-    Parameters
-    ----------
-    flow : Flow
-    place_m : (k, 3) float64, m
-
-    Returns
-    -------
-    (k,) float64, Pa
-        NaN where nothing is within the kernel.
+    Gives (k,) float64, Pa; NaN where nothing is within the kernel. ``place_m``: (k, 3) float64, m.
     """
     state = flow.particles
     has_pressure = state.kind != DUMMY
@@ -49,12 +40,8 @@ def window_means(
 ) -> tuple[Ints, Floats, Floats]:
     """Means over windows of time, steps weighted by their length.
 
-    Parameters
-    ----------
-    time_s, dt_s : (t,) float64, s
-        Ends and lengths of the steps.
-    values : (t, k) float64
-    window_s : float, s
+    ``time_s``, ``dt_s``, (t,) float64, s: ends and lengths of the steps. ``values``:
+    (t, k) float64.
 
     Returns
     -------
@@ -98,12 +85,9 @@ class History:
     def deviation_pa(self, window_s: float = 0.0) -> Floats:
         """Standard deviation in time of the same, (k,) float64, Pa.
 
-        Parameters
-        ----------
-        window_s : float, s
-            Pressures are averaged over windows of this length before; 0 takes single steps. With
-            c_poi = 1 the fluid is thrown up in one step and falls in the next: what such a run's
-            deviation is depends on the window.
+        ``window_s``: pressures are averaged over windows of this length before; 0 takes single
+        steps. With c_poi = 1 the fluid is thrown up in one step and falls in the next: what such a
+        run's deviation is depends on the window.
         """
         pressure, weights = self.particle_pressure_pa, self.dt_s
         if window_s > 0.0:

@@ -1,4 +1,7 @@
-"""A scenario of flow as particles, scheme and probes; what keeps it from one, and its cost."""
+"""A scenario of flow as particles, scheme and probes; what keeps it from one, and its cost.
+
+The paper's still fluid is 40 mm x 80 mm of molten aluminium at rest in a mould (figure 2).
+"""
 
 from __future__ import annotations
 
@@ -9,9 +12,18 @@ from typing import NamedTuple
 
 import numpy as np
 
+from sandmould.arrays import Flags, Floats
 from sandmould.bad_input import Problem
-from sandmould.casting.mps.flow import Flow, solves
-from sandmould.casting.mps.particles import Floats
+from sandmould.casting.mps.flow import Flow, FlowGuard, solves
+from sandmould.casting.mps.particles import (
+    FLUID,
+    WALL_LAYERS,
+    Particles,
+    at_rest,
+    lattice,
+    make_kernel,
+    mould_around,
+)
 from sandmould.casting.mps.scheme import G_M_S2, VISCOUS_SHARE, LiquidMetal, Scheme
 from sandmould.casting.mps.shoulder import (
     PAPERS,
@@ -22,7 +34,6 @@ from sandmould.casting.mps.shoulder import (
     ring_m,
     stream,
 )
-from sandmould.casting.mps.tank import open_tank
 from sandmould.scenario.casting.flow import MetalFlow, ShoulderedCylinder, StillTank
 
 FEWEST = 4
@@ -31,6 +42,48 @@ DEPTHS = (3 / 8, 5 / 8, 7 / 8)
 """The paper's 30, 50 and 70 mm over 80."""
 LEVELS = 8
 """Levels of metal at which the length of a step is foreseen."""
+SPACING_M = 2e-3
+COLUMNS, ROWS = 20, 40
+WALL_ROWS = 51
+"""Of the side walls: three layers by this height and a floor of three make the paper's 384."""
+
+
+def still_tank(columns: int = COLUMNS, rows: int = ROWS, spacing_m: float = SPACING_M) -> Particles:
+    """Fluid on its lattice in an open box, its walls as far above it as in the paper."""
+
+    def is_cavity(place: Floats) -> Flags:
+        inside = (place[:, 0] > 0.0) & (place[:, 0] < columns * spacing_m)
+        return inside & (place[:, 1] > 0.0)
+
+    top = rows + WALL_ROWS - ROWS
+    sites = lattice((-WALL_LAYERS, -WALL_LAYERS), (columns + WALL_LAYERS, top), spacing_m)
+    fluid = at_rest(lattice((0, 0), (columns, rows), spacing_m), FLUID)
+    return fluid.joined(mould_around(sites, is_cavity, spacing_m))
+
+
+def open_tank(
+    scheme: Scheme,
+    metal: LiquidMetal | None = None,
+    columns: int = COLUMNS,
+    rows: int = ROWS,
+    spacing_m: float = SPACING_M,
+) -> Flow:
+    """Flow in the paper's tank, or in one of other size.
+
+    The speed limit is that of a fall from three times the height of the walls: what started at
+    rest can only be as fast if energy came from nowhere.
+    """
+    metal = metal or LiquidMetal()
+    height_m = (rows + WALL_ROWS - ROWS) * spacing_m
+    g = float(np.linalg.norm(metal.gravity_m_s2))
+    margin = WALL_LAYERS * spacing_m
+    guard = FlowGuard(
+        float(np.sqrt(2.0 * g * 3.0 * height_m)),
+        (-margin, -margin, -1.0),
+        (columns * spacing_m + margin, 2.0 * height_m, 1.0),
+    )
+    tank = still_tank(columns, rows, spacing_m)
+    return Flow(tank, make_kernel(2, spacing_m), metal, scheme, guard)
 
 
 class PressureProbe(NamedTuple):

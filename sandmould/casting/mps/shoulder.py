@@ -14,10 +14,10 @@ from sandmould.casting.mps.particles import (
     WALL_LAYERS,
     at_rest,
     lattice,
+    make_kernel,
     mould_around,
 )
 from sandmould.casting.mps.scheme import LiquidMetal, Scheme
-from sandmould.casting.mps.weight import make_kernel
 
 RATE_KG_S = 0.1
 FREEBOARD = 10
@@ -84,15 +84,8 @@ def open_shoulder(
 ) -> Flow:
     """Flow in the mould, full of metal at rest or with a first layer to be poured on.
 
-    Parameters
-    ----------
-    size_m : float, m
-        Of the particles; the paper does not give it (2 mm make about 19 700 in the casting).
-    scheme : Scheme
-    full : bool
-    metal : LiquidMetal, optional
-        The paper's unless given; its gravity is along -z.
-    casting : Casting
+    ``size_m``: of the particles; the paper does not give it (2 mm make about 19 700 in the
+    casting). ``metal``: the paper's unless given; its gravity is along -z.
 
     Raises
     ------

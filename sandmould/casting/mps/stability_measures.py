@@ -53,15 +53,8 @@ class StabilityRating(Enum):
 def rate_stability(stopped: str, hops: bool, deviation_pa: float, off: float) -> StabilityRating:
     """Rate a run as the paper's figure 6 does, by numbers its text gives, and by its bias.
 
-    Parameters
-    ----------
-    stopped : str
-        Why a guard stopped it, or nothing.
-    hops : bool
-    deviation_pa : float, Pa
-        Standard deviation in time of the pressure at the deepest place.
-    off : float
-        Error of its mean there, over the exact pressure.
+    ``stopped``: why a guard stopped it, or nothing. ``deviation_pa``: standard deviation in time of
+    the pressure at the deepest place. ``off``: error of its mean there, over the exact pressure.
     """
     if stopped:
         return StabilityRating.FAILED
@@ -115,13 +108,7 @@ class StabilityMeasures:
 def measure_flow(scenario: MetalFlow, table: pd.DataFrame, stopped: str) -> StabilityMeasures:
     """Measure and rate a run.
 
-    Parameters
-    ----------
-    scenario : MetalFlow
-    table : DataFrame
-        ``series.tsv``.
-    stopped : str
-        Why a guard stopped it, or nothing.
+    ``table``: ``series.tsv``. ``stopped``: why a guard stopped it, or nothing.
     """
     names = [probe.name for probe in scene.probes_of(scenario)]
     whole = _history(table, names)
@@ -157,7 +144,6 @@ def _history(table: pd.DataFrame, names: Sequence[str]) -> History:
 
 
 def _later(past: History, from_s: float) -> History:
-    """Steps that end after a time."""
     later = past.time_s > from_s
     return History(*(getattr(past, name)[later] for name in History.__dataclass_fields__))
 
@@ -175,18 +161,7 @@ def _hops(scenario: MetalFlow, table: pd.DataFrame, past: History) -> bool:
 def by_window(table: pd.DataFrame, names: Sequence[str], window_s: float) -> pd.DataFrame:
     """Means over windows, and the fastest particle of each.
 
-    Parameters
-    ----------
-    table : DataFrame
-        ``series.tsv``.
-    names : sequence of str
-        Probes.
-    window_s : float, s
-
-    Returns
-    -------
-    DataFrame
-        A row a window, at its middle.
+    A row a window, at its middle. ``table``: ``series.tsv``. ``names``: probes.
     """
     time_s = table["time_s"].to_numpy(dtype=np.float64)
     dt_s = np.diff(time_s, prepend=0.0)

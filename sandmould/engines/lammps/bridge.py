@@ -101,11 +101,7 @@ class Bridge(NamedTuple):
 
 
 def _reader(named: Any, kind_of: Callable[[Any], Any], field_at: Callable[[Any, int], Any]) -> Any:
-    """Make the function of compiled code that reads a named tuple, field by field, out of an array.
-
-    ``kind_of`` gives the type of a field by its annotation, ``field_at`` what reads one of a type
-    at a place.
-    """
+    """Make the compiled function that reads a named tuple, field by field, out of an array."""
     kinds = [kind_of(hint) for hint in get_type_hints(named, include_extras=True).values()]
 
     @intrinsic

@@ -107,7 +107,6 @@ def _must_list(
 
 @njit(**OPTIONS)
 def _copy(source: WholeNumbers, target: Ints) -> None:
-    """Copy an array to the front of a longer one."""
     for i in range(len(source)):
         target[i] = source[i]
 
@@ -136,11 +135,8 @@ def _list(
     ids: Any,
     shift: Any,
 ) -> Ints:
-    """List candidates, the history carried over; give their parts.
-
-    A list too long for its array serves this step alone: it is made again in the next one, until
-    the session gives a longer array.
-    """
+    """List candidates, the history carried over; give their parts."""
+    # A list too long for its array serves this step alone, until the session gives a longer array.
     counts = bridge.counts
     n, old_rows = len(position), counts[ROWS]
     skin_m = constants_of(bridge.constants).skin_m
@@ -187,11 +183,9 @@ def _set_motion(bridge: Bridge, step: int) -> None:
 
 @njit(**OPTIONS)
 def _press(dim: Any, bridge: Bridge, step: int, ids: Any, position: Floats, added: Floats) -> None:
-    """Press the grains on the surfaces in one step.
-
-    LAMMPS calls once more at the start of a run, for the step that was the last one before: the
-    forces are found anew, but nothing moves on.
-    """
+    """Press the grains on the surfaces in one step."""
+    # LAMMPS calls once more at the start of a run, for the step that was the last one before: the
+    # forces are found anew, but nothing moves on.
     counts, displacement = bridge.counts, bridge.displacement
     n = len(position)
     _clear(added)

@@ -10,7 +10,6 @@ from typing import Any
 
 from sandmould.dem import source_files
 from sandmould.engines.bed_deck import sources_of_step
-from sandmould.engines.capabilities import Capabilities, Ranks
 from sandmould.engines.deck import Deck
 from sandmould.engines.lammps import OLDEST_VERSION
 from sandmould.engines.lammps.render import needs_callback
@@ -19,7 +18,7 @@ from sandmould.engines.lammps.render import render_deck as render_deck
 from sandmould.engines.lammps.render import write_deck as write_deck
 from sandmould.engines.lammps.session import LammpsSession, load_library
 from sandmould.engines.program import Program
-from sandmould.engines.session import SandSession, engine_stop
+from sandmould.engines.session import Capabilities, Ranks, SandSession, engine_stop
 from sandmould.scenario.scenario import Scenario
 
 GRAIN_STEPS_PER_S = 2.5e6
@@ -67,7 +66,7 @@ def communicator() -> Any:
 def session_sources(scenario: Scenario) -> list[list[Path]]:
     """The session, and our solver where LAMMPS is given forces of surfaces and damping by it."""
     here = Path(__file__).parent
-    session = [[here / "session.py", here / "wall_loads.py"], *sources_of_step(scenario)]
+    session = [[here / "session.py"], *sources_of_step(scenario)]
     if not needs_callback(scenario):
         return session
     callback = [here / name for name in ("bridge.py", "callback.py", "surface_kernel.py")]

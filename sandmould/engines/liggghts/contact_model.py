@@ -36,12 +36,8 @@ class PairTable:
 def damping_per_s(law: ContactLaw, mass_kg: float, lag_s: float) -> float:
     """LIGGGHTS's ``gamman``: it makes the dashpot c = m_eff gamman, and c = 2 zeta sqrt(k m_eff).
 
-    Parameters
-    ----------
-    mass_kg : float
-        Effective mass m1 m2/(m1 + m2) of a pair, m1 at a wall.
-    lag_s : float
-        That the dashpot makes up for.
+    ``mass_kg``: effective mass m1 m2/(m1 + m2) of a pair, m1 at a wall. ``lag_s``: that the dashpot
+    makes up for.
     """
     ratio = law.dashpot_ratio(mass_kg, lag_s)
     return 2 * ratio * math.sqrt(law.normal_stiffness_n_m / mass_kg)
@@ -62,12 +58,8 @@ def pair_tables(
 ) -> list[PairTable]:
     """All tables of a scenario.
 
-    Parameters
-    ----------
-    classes : list of dict
-        As ``sandmould.engines.deck_lines.size_classes`` gives them.
-    has_gate : bool
-        Whether a plate has a type of its own, alike to that of the walls until it is taken away.
+    ``classes``: as ``sandmould.engines.deck_lines.size_classes`` gives them. ``has_gate``: whether
+    a plate has a type of its own, alike to that of the walls until it is taken away.
     """
     flat = 2 if has_gate else 1
     grain, wall = contact.grain_grain, contact.grain_wall
@@ -142,12 +134,7 @@ def rolling_model(contact: Contact) -> RollingModel | None:
 
 
 def refuse_law(contact: Contact) -> None:
-    """Refuse a law that the contact model cannot say.
-
-    Raises
-    ------
-    RefusedError
-    """
+    """Refuse a law that the contact model cannot say (RefusedError)."""
     if contact.slip_normal == "half_step":
         raise RefusedError("contact.slip_normal", "half_step", "full_step on engine liggghts")
     for name in ("grain_grain", "grain_wall"):

@@ -5,16 +5,15 @@ from __future__ import annotations
 from pathlib import Path
 
 from sandmould.engines.bed_deck import sources_of_step
-from sandmould.engines.capabilities import Capabilities, Ranks
 from sandmould.engines.deck import Deck
 from sandmould.engines.liggghts import OLDEST_VERSION
 from sandmould.engines.liggghts.process import Conversation, LiggghtsDied, executable, version_of
-from sandmould.engines.liggghts.refusals import refuse as refuse
+from sandmould.engines.liggghts.render import refuse as refuse
 from sandmould.engines.liggghts.render import render_deck as render_deck
 from sandmould.engines.liggghts.render import write_deck as write_deck
 from sandmould.engines.liggghts.session import LiggghtsSession
 from sandmould.engines.program import Program
-from sandmould.engines.session import EngineStop, SandSession, engine_stop
+from sandmould.engines.session import Capabilities, EngineStop, Ranks, SandSession, engine_stop
 from sandmould.runs.outcome import Outcome
 from sandmould.scenario.scenario import Scenario
 
@@ -54,8 +53,7 @@ def communicator() -> None:
 
 def session_sources(scenario: Scenario) -> list[list[Path]]:
     """The session and the files that pass between it and the engine."""
-    names = ("session.py", "process.py", "grains_file.py", "mesh_files.py", "bending_mesh.py",
-             "vtk_stress.py")  # fmt: skip
+    names = ("session.py", "process.py", "mesh_files.py")
     session = [Path(__file__).with_name(name) for name in names]
     return [session, *sources_of_step(scenario)]
 

@@ -26,10 +26,8 @@ def surface_triangles(
     ``simulation_box``, list of (low, high), m: one pair for each of three axes; the triangles stay
     well inside, as LIGGGHTS drops those that leave it.
 
-    Returns
-    -------
-    mapping of surface to (n, 3, 3) float64, m
-        Corners of each triangle, counter-clockwise seen from the sand.
+    Gives the corners of each triangle by surface, (n, 3, 3) float64, m, counter-clockwise seen from
+    the sand.
     """
     low, high = np.array(simulation_box).T
     # A quarter of the margin round the moulding box, and all that the box may move.
@@ -99,7 +97,6 @@ def outline_strips(outline_m: Array, span_m: tuple[float, float]) -> Array:
 
 
 def _cuboid(block: Block) -> Array:
-    """The six faces of a block."""
     edges = 2 * block.half_size_m[:, None] * block.axes
     faces = []
     for i in range(3):

@@ -10,15 +10,21 @@ import re
 import select
 import shutil
 import signal
+import struct
 import subprocess
 import termios
 from pathlib import Path
 
+import numpy as np
+
+from sandmould.geometry.geometry import Array
 from sandmould.runs.parent import end_with_parent
 
 _VERSION = re.compile(r"LIGGGHTS-PUBLIC (\d+(?:\.\d+)+)")
 _LOOK_EVERY_S = 1.0
 """How often a silent process is looked at, in case it died without closing its terminal."""
+_HEADER = struct.Struct("=qq7i6dii")
+"""Step, rows, triclinic, six kinds of boundary, six bounds, columns, processors."""
 
 
 def executable() -> str | None:
@@ -51,11 +57,7 @@ def _environment() -> dict[str, str]:
 
 
 def _live_and_die_with_parent() -> None:
-    """Leave signals that ask for an end to the process that started this one, and end with it.
-
-    A batch system signals every process of a job; the parent ends in an orderly way, with a
-    checkpoint, for which it still needs LIGGGHTS.
-    """
+    """Leave signals to the parent, which ends in an orderly way with a checkpoint; end with it."""
     signal.pthread_sigmask(signal.SIG_BLOCK, (signal.SIGTERM, signal.SIGINT, signal.SIGHUP))
     end_with_parent(signal.SIGKILL)
 
@@ -72,10 +74,7 @@ class Conversation:
     """
 
     def __init__(self, path: str, folder: Path, log: Path) -> None:
-        """Start LIGGGHTS.
-
-        ``folder``: working folder, so that a deck's relative names hold.
-        """
+        """Start LIGGGHTS. ``folder``: working folder, so that a deck's relative names hold."""
         self._screen, theirs = pty.openpty()
         _keep_line_ends(theirs)
         self._process = subprocess.Popen(
@@ -97,9 +96,7 @@ class Conversation:
     def say(self, commands: str) -> str:
         """Have commands executed and wait for their end; gives what LIGGGHTS printed meanwhile.
 
-        Raises
-        ------
-        LiggghtsDied
+        Raises LiggghtsDied.
         """
         self._requests += 1
         marker = f"<sandmould {self._requests}>"
@@ -158,3 +155,25 @@ def _keep_line_ends(terminal: int) -> None:
     attributes = termios.tcgetattr(terminal)
     attributes[1] &= ~termios.OPOST
     termios.tcsetattr(terminal, termios.TCSANOW, attributes)
+
+
+def read_grains(path: Path) -> Array:
+    """Read a binary dump of one instant, written by one process.
+
+    Gives (n, columns) float64; sorted by the first column, the ids.
+
+    Raises
+    ------
+    ValueError
+        When the file is cut short.
+    """
+    data = path.read_bytes()
+    if len(data) < _HEADER.size + 4:
+        raise ValueError(f"{path}: cut short")
+    header = _HEADER.unpack_from(data)
+    rows, columns = header[1], header[-2]
+    values = np.frombuffer(data, dtype=np.float64, offset=_HEADER.size + 4)
+    if columns < 1 or values.size != rows * columns:
+        raise ValueError(f"{path}: {values.size} numbers instead of {rows} x {columns}")
+    table = values.reshape(rows, columns)
+    return table[np.argsort(table[:, 0])]

@@ -15,12 +15,15 @@ from sandmould.engines.deck import Deck, exact
 from sandmould.engines.deck_context import deck_context
 from sandmould.engines.deck_lines import Lines, simulation_box, size_classes
 from sandmould.engines.liggghts import OLDEST_VERSION
-from sandmould.engines.liggghts.contact_model import pair_tables, rolling_model
+from sandmould.engines.liggghts.contact_model import pair_tables, refuse_law, rolling_model
 from sandmould.engines.liggghts.mesh_files import largest_motion_m, surface_triangles, write_stl
 from sandmould.engines.program import Program
+from sandmould.engines.session import RefusedError
 from sandmould.geometry.geometry import Array
 from sandmould.scenario.placement import PlannedLayer
 from sandmould.scenario.scenario import Scenario
+
+_HERE = "on engine liggghts"
 
 
 def bounds_m(program: Program) -> list[tuple[float, float]]:
@@ -52,7 +55,6 @@ def render_deck(
 
 
 def _own_context(program: Program, lines: Lines) -> dict[str, Any]:
-    """What only the templates of LIGGGHTS are given."""
     scenario = program.scenario
     gate = scenario.discharge is not None
     return {
@@ -138,3 +140,47 @@ def write_deck(
     for name, triangles in surface_meshes(program).items():
         write_stl(layers / f"{name}.stl", name, triangles)
     render_deck(program, sources, run, study).write(folder)
+
+
+def refuse(scenario: Scenario) -> None:
+    """Refuse what this engine lacks.
+
+    Raises
+    ------
+    RefusedError
+        With one sentence.
+    """
+    if scenario.engine.ranks > 1:
+        raise RefusedError("engine.ranks", scenario.engine.ranks, f"1 {_HERE}")
+    if scenario.dimension == 2 and scenario.sand.disc_inertia == "disc":
+        # Meshes need three dimensions, where a grain is a sphere.
+        raise RefusedError("sand.disc_inertia", "disc", f"sphere {_HERE}")
+    if scenario.time_step.rotational_inertia == "scaled":
+        raise RefusedError("time_step.rotational_inertia", "scaled", f"physical {_HERE}")
+    if scenario.record.orientation:
+        raise RefusedError("record.orientation", True, f"false {_HERE}")
+    _refuse_round_solids(scenario)
+    _refuse_damping(scenario)
+    refuse_law(scenario.contact)
+
+
+def _refuse_round_solids(scenario: Scenario) -> None:
+    """Meshes have flat facets; how many would do is for the user to say."""
+    for i, obstacle in enumerate(scenario.obstacles):
+        if obstacle.kind == "cylinder":
+            valid = f"plate, tube, polygon or mesh {_HERE}"
+            raise RefusedError(f"obstacles.{i}.kind", obstacle.kind, valid)
+        if obstacle.kind == "tube" and scenario.dimension == 3 and obstacle.section == "round":
+            raise RefusedError(f"obstacles.{i}.section", obstacle.section, f"facets {_HERE}")
+
+
+def _refuse_damping(scenario: Scenario) -> None:
+    damping = scenario.background_damping
+    if damping.form not in ("none", "viscous"):
+        raise RefusedError("background_damping.form", damping.form, f"none or viscous {_HERE}")
+    if damping.form == "viscous" and damping.viscous_rotation_per_s > 0:
+        raise RefusedError(
+            "background_damping.viscous_rotation_per_s",
+            damping.viscous_rotation_per_s,
+            f"0 {_HERE}, which damps translation only",
+        )

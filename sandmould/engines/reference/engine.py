@@ -11,12 +11,11 @@ import numpy as np
 from sandmould.dem import source_files, source_hash
 from sandmould.digest import SHORT
 from sandmould.engines.bed_deck import step_meaning
-from sandmould.engines.capabilities import Capabilities, Ranks
 from sandmould.engines.deck import Deck, exact
 from sandmould.engines.deck_context import deck_context
 from sandmould.engines.deck_lines import Lines
 from sandmould.engines.program import Program
-from sandmould.engines.session import SandSession
+from sandmould.engines.session import Capabilities, Ranks, SandSession
 from sandmould.runs.hashing import scenario_hash
 from sandmould.scenario.contact import SYMBOLS
 from sandmould.scenario.placement import PlannedLayer
@@ -61,8 +60,7 @@ def session_sources(scenario: Scenario) -> list[list[Path]]:
     """The solver, and how it is given a scene."""
     here = Path(__file__).parent
     session = [here / name for name in ("model.py", "moved_solver.py", "session.py")]
-    shared = [here.parent / name for name in ("solid_surfaces.py", "table_drive.py")]
-    return [source_files(), [*session, *shared]]
+    return [source_files(), [*session, here.parent / "solid_surfaces.py"]]
 
 
 def render_deck(program: Program, sources: Mapping[str, str], run: str, study: str) -> Deck:

@@ -105,7 +105,6 @@ class MovedSolver(TableSolver):
         )
 
     def _run(self, steps: int, drifted: bool, displacement_m: Floats) -> tuple[int, int]:
-        """Let all threads run the step loop together."""
         mover = self._mover
         if mover is None:
             return super()._run(steps, drifted, displacement_m)

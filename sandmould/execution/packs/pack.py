@@ -10,7 +10,7 @@ from pathlib import Path
 from sandmould.bad_input import BadInputError, Problem, display_path
 from sandmould.definition.run import FILLS
 from sandmould.digest import file_digest
-from sandmould.engines.snapshot_file import SNAPSHOTS, SnapshotFile, stored_snapshots
+from sandmould.engines.snapshot import SNAPSHOTS, SnapshotFile, stored_snapshots
 from sandmould.execution.packs.archive import AT_END, SUFFIX, place_of, reasons_lines, write_pack
 from sandmould.runs.formatting import listed, size_text
 from sandmould.runs.manifest import (

@@ -52,7 +52,7 @@ class FlowExecution(CastingExecution[MetalFlow]):
 
     def export(self, run: Run, folder: Path) -> None:
         """Draw the last field."""
-        from sandmould.analysis.flow_plots import draw_last
+        from sandmould.analysis.casting_plots import draw_last
 
         fields, series = read_fields(folder), pd.read_csv(folder / "series.tsv", sep="\t")
         highest_pa = max(measure_flow(run.scenario, series, "").ideal_pa.values())

@@ -16,11 +16,10 @@ from sandmould.pattern_fe.coupling.convergence_log import CONVERGENCE_LOG, read_
 from sandmould.pattern_fe.coupling.foam_body import FoamBody
 from sandmould.pattern_fe.coupling.gain_prediction import predicted_gain
 from sandmould.pattern_fe.coupling.loop_verdict import LoopVerdict, classify_loop, stored_energy_j
-from sandmould.pattern_fe.distance import distance_from_drawing
 from sandmould.pattern_fe.large_displacement import LoadNotReachedError
 from sandmould.pattern_fe.loads import pressure_above_and_below_pa
 from sandmould.pattern_fe.pattern import Pattern
-from sandmould.pattern_fe.perimeter import Perimeter
+from sandmould.pattern_fe.perimeter import Perimeter, distance_from_drawing
 from sandmould.pattern_fe.scene import pattern_of, surroundings_of
 from sandmould.pattern_fe.supports import AXES
 from sandmould.runs.outcome import Outcome, RunOutcome

@@ -12,7 +12,7 @@ from sandmould.engines.deck import environment
 from sandmould.engines.driver import Driver, Opening
 from sandmould.engines.durations import cost_before
 from sandmould.engines.program import Program, build_program
-from sandmould.engines.snapshot_file import close_torn
+from sandmould.engines.snapshot import close_torn
 from sandmould.kinds.kind import Execution
 from sandmould.kinds.sand.shared_fill import fill_apart, lay_fill
 from sandmould.runs.hashing import scenario_hash

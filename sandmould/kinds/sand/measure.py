@@ -9,23 +9,20 @@ from typing import Any
 import numpy as np
 import pandas as pd
 
-from sandmould.analysis.bed_density import own_solid_fraction
-from sandmould.analysis.cavity_fill import cavity_fill, cavity_voids
+from sandmould.analysis.cavity_fill import cavity_fill, cavity_voids, reached_share
 from sandmould.analysis.coordination import contacts
 from sandmould.analysis.deflection import fill_under
 from sandmould.analysis.density import apparent_density
-from sandmould.analysis.layers import mixing_index
 from sandmould.analysis.loose_zones import LooseSand, find_loose_sand
-from sandmould.analysis.reached_space import reached_share
 from sandmould.analysis.solid_fraction import (
     bed_surface_height_m,
     mean_solid_fraction,
+    own_solid_fraction,
     solid_fraction_profile,
 )
-from sandmould.analysis.tube_fill import tube_fill
+from sandmould.analysis.tube_fill import mixing_index, tube_fill
 from sandmould.definition.run import LAST_MEASURED
-from sandmould.engines.snapshot import Snapshot, scene_at
-from sandmould.engines.snapshot_file import stored_snapshots
+from sandmould.engines.snapshot import Snapshot, scene_at, stored_snapshots
 from sandmould.geometry.geometry import Cavity, Scene
 from sandmould.kinds.sand.measures import seeks_loose_sand
 from sandmould.kinds.sand.moments import MOMENTS, list_moments, nearest

@@ -8,8 +8,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
-from sandmould.engines.snapshot import Snapshot
-from sandmould.engines.snapshot_file import StoredSnapshot, stored_snapshots
+from sandmould.engines.snapshot import Snapshot, StoredSnapshot, stored_snapshots
 
 MOMENTS = {"at its start": 0.0, "after 1/8": 0.125, "after 1/2": 0.5, "at its end": 1.0}
 """Shares of the vibration that are shown, by their heading."""

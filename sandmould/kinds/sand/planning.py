@@ -34,9 +34,8 @@ from sandmould.scenario.solids import READ_BYTES, SolidMesh, drawn_part, drawn_s
 
 MEASURING = (
     *(f"sandmould/analysis/{name}.py" for name in (
-        "bed_density", "cavity_fill", "coordination", "deflection", "density", "free_space",
-        "intersections", "layers", "loose_zones", "mesh_parts", "reached_space", "repose",
-        "sections", "solid_fraction", "tube_fill",
+        "cavity_fill", "coordination", "deflection", "density", "free_space", "intersections",
+        "loose_zones", "repose", "sections", "solid_fraction", "tube_fill",
     )),
     *(f"sandmould/kinds/sand/{name}.py" for name in (
         "bending", "measure", "moments", "outflow",

@@ -47,8 +47,8 @@ class SolidificationExecution(CastingExecution[Solidification]):
 
     def export(self, run: Run, folder: Path) -> None:
         """Draw how the metal froze; write the fields for ParaView and the curves for a sheet."""
+        from sandmould.analysis.casting_plots import draw_freezing
         from sandmould.analysis.export import elements_to_vtk
-        from sandmould.analysis.freezing_plots import draw_freezing
 
         fields, draw = read_fields(folder), None
         if fields:

@@ -17,7 +17,7 @@ from matplotlib.colors import to_hex
 from matplotlib.figure import Figure
 from numpy.typing import NDArray
 
-from sandmould.analysis.flow_plots import draw_frame, frame_of
+from sandmould.analysis.casting_plots import draw_frame, frame_of
 from sandmould.casting.mps import scene
 from sandmould.casting.mps.scheme import G_M_S2
 from sandmould.casting.mps.shoulder import HOP_SPEED_M_S, PAPERS

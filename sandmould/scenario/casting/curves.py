@@ -67,19 +67,9 @@ def solid_fractions(
     Metallkunde 34 (1942) 70-72) nothing diffuses in the solid. What is left at the solidus, that
     of the eutectic, freezes there.
 
-    Parameters
-    ----------
-    law : str
-        ``line``, ``lever`` or ``scheil``.
-    solidus_k, liquidus_k : float, K
-    melting_k : float, K
-        Of the pure metal.
-    partition : float
-        Solute in the solid over that in the liquid beside it.
-
-    Returns
-    -------
-    pairs of temperature (K) and fraction; none for a straight line
+    Gives pairs of temperature (K) and fraction; none for a straight line. ``law``: ``line``,
+    ``lever`` or ``scheil``. ``melting_k``: of the pure metal. ``partition``: solute in the solid
+    over that in the liquid beside it.
     """
     if law == "line":
         return ()

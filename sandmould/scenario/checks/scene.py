@@ -21,9 +21,8 @@ from sandmould.scenario.box import (
     tube_wall,
 )
 from sandmould.scenario.checks.cavities import cavity_problems
+from sandmould.scenario.checks.moving import piston_problems, table_mass_problem, unbalance_problems
 from sandmould.scenario.checks.placed import placed_problems
-from sandmould.scenario.checks.unbalance import table_mass_problem, unbalance_problems
-from sandmould.scenario.moving_walls import piston_problems
 from sandmould.scenario.placement import fall_s, plan_counts, portion_of, predicted_bed_height_m
 from sandmould.scenario.scenario import Scenario
 from sandmould.scenario.solids import (

@@ -35,10 +35,7 @@ class ThinWall:
 
 
 def thinnest_wall(bodies: Sequence[Body], below_m: float) -> ThinWall | None:
-    """Find walls thinner than a limit; None where none is.
-
-    ``bodies``: parts that touch are one.
-    """
+    """Find walls thinner than a limit; None where none is. ``bodies``: parts that touch are one."""
     samples = [_surface(body, below_m) for body in bodies]
     place, normal, area = (np.concatenate(parts) for parts in zip(*samples, strict=True))
     if (every := -(-len(place) // MOST_PLACES)) > 1:

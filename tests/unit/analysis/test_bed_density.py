@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from sandmould.analysis.bed_density import own_solid_fraction
+from sandmould.analysis.solid_fraction import own_solid_fraction
 from sandmould.geometry.geometry import Block, Cavity, Scene
 from tests.unit.analysis.test_loose_zones import GRAIN_M, box, lattice_round
 

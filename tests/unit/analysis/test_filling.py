@@ -7,7 +7,7 @@ import math
 import numpy as np
 import pytest
 
-from sandmould.analysis.filling import fit_limbs
+from sandmould.analysis.spectrum import fit_limbs
 
 F_HZ = np.array([10.0, 20.0, 40.0, 80.0, 160.0])
 

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from numpy.testing import assert_allclose
 
-from sandmould.analysis.layers import mixing_index, tube_shares
+from sandmould.analysis.tube_fill import mixing_index, tube_shares
 from sandmould.geometry.geometry import Bore
 
 

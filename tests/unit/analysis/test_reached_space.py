@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from sandmould.analysis.reached_space import reached_share
+from sandmould.analysis.cavity_fill import reached_share
 from sandmould.scenario.scenario import Scenario
 
 

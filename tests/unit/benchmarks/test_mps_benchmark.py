@@ -9,8 +9,8 @@ import pytest
 from benchmarks.mps.page import page
 from benchmarks.mps.peers import measured
 from benchmarks.mps.solvers import poisson_of, rows_here
+from sandmould.casting.mps.scene import open_tank
 from sandmould.casting.mps.scheme import Scheme
-from sandmould.casting.mps.tank import open_tank
 
 
 def row(scheme: str, relaxations: int, cost: float, noise: float, **more: Any) -> dict[str, Any]:

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from sandmould.casting.arpm.elements import Elements, placed
-from sandmould.casting.arpm.faces import faces_of
+from sandmould.casting.arpm.exchange import faces_of
 from sandmould.casting.arpm.kernel import kernel_exchange, neighbours, volume_weight, weight
 from sandmould.casting.arpm.raster import Raster, painted
 from sandmould.geometry.mesh import TriangleMesh

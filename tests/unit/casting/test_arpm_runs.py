@@ -5,13 +5,11 @@ import pytest
 
 from sandmould.casting.arpm.elements import Elements, placed
 from sandmould.casting.arpm.filling import Filling
+from sandmould.casting.arpm.marching import stage_weights
 from sandmould.casting.arpm.material import ThermalMaterial
-from sandmould.casting.arpm.method import HeatMethod
-from sandmould.casting.arpm.power_diagram import power_exchange
-from sandmould.casting.arpm.probes import probe_weights
+from sandmould.casting.arpm.method import HeatMethod, power_exchange
 from sandmould.casting.arpm.raster import Raster
-from sandmould.casting.arpm.solidification import UnstableError, solidify
-from sandmould.casting.arpm.super_steps import stage_weights
+from sandmould.casting.arpm.solidification import UnstableError, probe_weights, solidify
 from tests.verification.castings.contact import contact_elements
 from tests.verification.castings.plates import plates_layout, read_plates
 

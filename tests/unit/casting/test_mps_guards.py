@@ -6,11 +6,10 @@ import numpy as np
 import pytest
 
 from sandmould.casting.mps.flow import DivergedError, EscapedError, Flow, FlowGuard, FlowProgress
-from sandmould.casting.mps.particles import DUMMY, FLUID, WALL, at_rest, lattice
+from sandmould.casting.mps.particles import DUMMY, FLUID, WALL, at_rest, lattice, make_kernel
 from sandmould.casting.mps.pressure import ClosedRegionError
+from sandmould.casting.mps.scene import still_tank
 from sandmould.casting.mps.scheme import LiquidMetal, Scheme
-from sandmould.casting.mps.tank import still_tank
-from sandmould.casting.mps.weight import make_kernel
 
 SIZE_M = 2e-3
 

@@ -8,10 +8,17 @@ from scipy.sparse import csr_array, eye_array
 from scipy.sparse.linalg import spsolve
 
 from sandmould.casting.mps.neighbours import Neighbours, find_candidates, find_neighbours
-from sandmould.casting.mps.particles import DUMMY, FLUID, Particles, at_rest, lattice
+from sandmould.casting.mps.particles import (
+    DUMMY,
+    FLUID,
+    Kernel,
+    Particles,
+    at_rest,
+    lattice,
+    make_kernel,
+)
 from sandmould.casting.mps.pressure import Rows, assemble, solve_pressure
-from sandmould.casting.mps.tank import still_tank
-from sandmould.casting.mps.weight import Kernel, make_kernel
+from sandmould.casting.mps.scene import still_tank
 
 SIZE_M = 2e-3
 

@@ -7,12 +7,11 @@ import pytest
 
 from sandmould.casting.mps.flow import Flow
 from sandmould.casting.mps.neighbours import find_candidates, find_neighbours
-from sandmould.casting.mps.particles import FLUID, at_rest, lattice
+from sandmould.casting.mps.particles import FLUID, at_rest, lattice, make_kernel
 from sandmould.casting.mps.probes import History, pressure_at, pressure_nearest
+from sandmould.casting.mps.scene import open_tank
 from sandmould.casting.mps.scheme import Scheme
 from sandmould.casting.mps.stability_measures import StabilityRating, rate_stability, still_hops
-from sandmould.casting.mps.tank import open_tank
-from sandmould.casting.mps.weight import make_kernel
 from tests.verification.castings.still_fluid import (
     compression_gain,
     ideal_pa,

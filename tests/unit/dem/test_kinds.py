@@ -9,7 +9,7 @@ import pytest
 
 from sandmould.dem.contact_law import Law
 from sandmould.dem.grains import MOST_KINDS, Grains
-from sandmould.dem.kinds import pair_up
+from sandmould.dem.moving_state import pair_up
 
 LAW = Law(1e4, 8e3, 0.4, 0.2, 0.1, 5e3, True, False)
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from sandmould.dem import chunks as chunks_module
+from sandmould.dem import moving_state
 from sandmould.dem.contact_law import Law
 from sandmould.dem.grains import Grains
 from sandmould.dem.motion import ISOTROPIC, NONE, Damping
@@ -199,7 +199,7 @@ def test_looks_for_near_pairs_change_no_bit(
 
 @pytest.mark.parametrize("dimension", [2, 3])
 def test_threads_change_no_bit(dimension: int, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(chunks_module, "CHUNK", 40)
+    monkeypatch.setattr(moving_state, "CHUNK", 40)
     one, two = (solver(dimension, 400, threads=t) for t in (1, 2))
     two._threads = 2  # also where the machine has one core
     for s in (one, two):
@@ -213,7 +213,7 @@ def test_threads_change_no_bit(dimension: int, monkeypatch: pytest.MonkeyPatch) 
 def test_chunks_change_round_off_alone(monkeypatch: pytest.MonkeyPatch) -> None:
     whole = solver(3, 400)
     whole.advance(np.zeros(2002))
-    monkeypatch.setattr(chunks_module, "CHUNK", 40)
+    monkeypatch.setattr(moving_state, "CHUNK", 40)
     parts = solver(3, 400)
     parts.advance(np.zeros(2002))  # not for long: round-off grows with every collision
     contacts, bound = parts.contacts, parts.moving.bound

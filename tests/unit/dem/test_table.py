@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from sandmould.dem import chunks as chunks_module
+from sandmould.dem import moving_state
 from sandmould.dem.motion import NONE, Damping
 from sandmould.dem.steps import DemScene
 from sandmould.dem.table import MountedTable, TableDrive, TableSolver, sand_force
@@ -74,7 +74,7 @@ def test_the_forces_on_the_grains_tell_the_force_on_the_walls(dimension: int) ->
 def test_windows_threads_and_a_restart_change_no_digit(
     dimension: int, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr(chunks_module, "CHUNK", 40)
+    monkeypatch.setattr(moving_state, "CHUNK", 40)
     straight = table_solver(dimension, box_frame=True)
     end = shaken(straight, LANDED)[-1]
     assert straight.lists > 2, "grains must have been listed again on the way"

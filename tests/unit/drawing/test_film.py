@@ -13,7 +13,7 @@ import pytest
 from sandmould import ROOT
 from sandmould.drawing.animation import ABSENT, Film, make_film
 from sandmould.drawing.figures import cut_m, section_of
-from sandmould.engines.snapshot_file import stored_snapshots
+from sandmould.engines.snapshot import stored_snapshots
 from sandmould.kinds.sand.moments import list_moments, nearest
 from sandmould.study.plan.expand import expand
 from sandmould.study.plan.load_study import open_study

@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from sandmould.engines.blockage import what_blocks
+from sandmould.engines.rest import what_blocks
 from tests.hopper import (
     BOX_WIDTH_M,
     DEEP,

@@ -8,8 +8,8 @@ from typing import Any
 import pytest
 
 from sandmould.bad_input import BadInputError
-from sandmould.engines.capabilities import Capabilities
 from sandmould.engines.registry import engine_module, engines_that
+from sandmould.engines.session import Capabilities
 from sandmould.engines.staged_session import StagedSession
 from sandmould.pattern_fe.coupling.interface import with_surface
 from sandmould.pattern_fe.coupling.schemes import SCHEMES, can_couple

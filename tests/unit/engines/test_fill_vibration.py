@@ -9,10 +9,8 @@ import numpy as np
 import pytest
 
 from sandmould import ROOT
-from sandmould.engines.box_motion import displacements
 from sandmould.engines.durations import grain_steps, stage_s
-from sandmould.engines.program import build_program
-from sandmould.engines.step_counts import StepCounts
+from sandmould.engines.program import StepCounts, build_program, displacements
 from sandmould.kinds.sand.kind import SAND
 from sandmould.scenario.checks.scene import problems
 from sandmould.scenario.fill import FillVibration

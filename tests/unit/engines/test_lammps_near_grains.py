@@ -10,9 +10,8 @@ import numpy as np
 import pytest
 
 from sandmould.engines.deck import Deck
-from sandmould.engines.lammps import near_grains
-from sandmould.engines.lammps.near_grains import NearGrains
-from sandmould.engines.lammps.render import render_deck, write_deck
+from sandmould.engines.lammps import render
+from sandmould.engines.lammps.render import NearGrains, render_deck, write_deck
 from sandmould.engines.lammps.session import LammpsSession
 from sandmould.engines.program import build_program
 from sandmould.scenario.scenario import Scenario
@@ -105,7 +104,7 @@ def test_all_walls_share_a_group_where_lammps_has_too_few(
 ) -> None:
     scene = hopper_scene("lammps", **SHORT)
     other = computed(scene, tmp_path / "one_each", str)
-    monkeypatch.setattr(near_grains, "MOST_GROUPS", 3)
+    monkeypatch.setattr(render, "MOST_GROUPS", 3)
     assert NearGrains(scene).groups() == ["near_walls", f"near_{NearGrains(scene).gate}"]
     assert "one group for all walls" in render_deck(build_program(scene), {}).text
     assert same(computed(scene, tmp_path / "one", str), other)

@@ -11,8 +11,8 @@ import numpy as np
 import pytest
 
 from sandmould.engines.deck import Deck
-from sandmould.engines.liggghts.grains_file import read_grains
 from sandmould.engines.liggghts.mesh_files import LONGEST_OVER_WIDE, write_stl
+from sandmould.engines.liggghts.process import read_grains
 from sandmould.engines.liggghts.render import (
     bounds_m,
     layer_data,
@@ -20,7 +20,7 @@ from sandmould.engines.liggghts.render import (
     surface_meshes,
     write_deck,
 )
-from sandmould.engines.liggghts.vtk_stress import read_triangle_loads
+from sandmould.engines.liggghts.session import read_triangle_loads
 from sandmould.engines.program import Program, build_program
 from sandmould.geometry.geometry import Array
 from tests.liggghts_scenes import liggghts_scene

@@ -7,7 +7,7 @@ from typing import Any
 import pytest
 
 from sandmould.engines.liggghts import engine, process
-from sandmould.engines.liggghts.refusals import refuse
+from sandmould.engines.liggghts.render import refuse
 from sandmould.engines.registry import engine_problem
 from sandmould.engines.session import RefusedError
 from tests.liggghts_scenes import liggghts_scene

@@ -9,10 +9,9 @@ import numpy as np
 import pytest
 
 from sandmould.engines.durations import run_s, stage_s
-from sandmould.engines.program import build_program
+from sandmould.engines.program import StepCounts, build_program
 from sandmould.engines.reference.session import ReferenceSession
 from sandmould.engines.registry import engine_problem
-from sandmould.engines.step_counts import StepCounts
 from sandmould.scenario.checks.scene import problems
 from sandmould.scenario.scenario import Scenario
 from tests.scenes import tube_scene

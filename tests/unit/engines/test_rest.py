@@ -14,8 +14,8 @@ from sandmould.engines.driver import Driver
 from sandmould.engines.program import build_program
 from sandmould.engines.rest import RestWatch
 from sandmould.runs.outcome import Outcome
+from sandmould.scenario.fill import Rest
 from sandmould.scenario.reading import Origin, validated
-from sandmould.scenario.rest import Rest
 from sandmould.scenario.scenario import Scenario
 from tests.scenes import open_engine, tube_scene
 from tests.verification.one_grain import RADIUS_M, one_grain_scene

@@ -10,14 +10,12 @@ import numpy as np
 import pytest
 
 from sandmould.bad_input import BadInputError
-from sandmould.engines.box_motion import displacements
 from sandmould.engines.driver import Driver
 from sandmould.engines.durations import grain_steps, run_s, stage_s
 from sandmould.engines.guard import measure_health
-from sandmould.engines.program import Stage, build_program
+from sandmould.engines.program import Stage, StepCounts, build_program, displacements
 from sandmould.engines.reference.session import ReferenceSession
 from sandmould.engines.registry import engine_of
-from sandmould.engines.step_counts import StepCounts
 from sandmould.kinds.sand.measure import measure_snapshot
 from sandmould.runs.outcome import Outcome
 from sandmould.scenario.checks.scene import problems

@@ -9,8 +9,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from sandmould.engines.snapshot import Snapshot
-from sandmould.engines.snapshot_file import SnapshotFile, stored_snapshots
+from sandmould.engines.snapshot import Snapshot, SnapshotFile, stored_snapshots
 
 ONE = np.array([1])
 FILLING = Snapshot(

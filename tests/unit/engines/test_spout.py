@@ -8,9 +8,8 @@ from typing import Any
 import numpy as np
 import pytest
 
-from sandmould.engines.program import build_program
+from sandmould.engines.program import StepCounts, build_program
 from sandmould.engines.registry import engine_of
-from sandmould.engines.step_counts import StepCounts
 from sandmould.scenario.checks.scene import problems
 from sandmould.scenario.scenario import Scenario
 from tests.liggghts_scenes import SOFT, WHAT_LIGGGHTS_CAN

@@ -10,10 +10,9 @@ import pytest
 
 from sandmould.engines.driver import Driver
 from sandmould.engines.durations import grain_steps, stage_s
-from sandmould.engines.program import build_program
+from sandmould.engines.program import StepCounts, build_program
 from sandmould.engines.reference.session import ReferenceSession
 from sandmould.engines.registry import engine_of, engine_problem
-from sandmould.engines.step_counts import StepCounts
 from sandmould.runs.outcome import Outcome
 from sandmould.scenario.checks.scene import problems
 from sandmould.scenario.scenario import Scenario

@@ -16,8 +16,7 @@ import pytest
 from sandmould.bad_input import BadInputError
 from sandmould.definition.run import Run
 from sandmould.digest import digest, file_digest
-from sandmould.engines.snapshot import Snapshot
-from sandmould.engines.snapshot_file import SNAPSHOTS, SnapshotFile, stored_snapshots
+from sandmould.engines.snapshot import SNAPSHOTS, Snapshot, SnapshotFile, stored_snapshots
 from sandmould.execution.packs.pack import pack
 from sandmould.execution.packs.unpack import unpack
 from sandmould.kinds.registry import kind_of

@@ -14,8 +14,7 @@ import pytest
 
 from sandmould import ROOT
 from sandmould.definition.run import Run
-from sandmould.engines.snapshot import Snapshot
-from sandmould.engines.snapshot_file import stored_snapshots
+from sandmould.engines.snapshot import Snapshot, stored_snapshots
 from sandmould.execution import records
 from sandmould.kinds.sand.exports import write_exports, write_picture
 from sandmould.kinds.sand.measure import write_measures, write_profile

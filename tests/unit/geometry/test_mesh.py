@@ -7,9 +7,13 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from sandmould.analysis.free_space import free_measure_between, free_part
+from sandmould.analysis.free_space import (
+    free_measure_between,
+    free_part,
+    mesh_below_m3,
+    sphere_mesh_m3,
+)
 from sandmould.analysis.intersections import sphere_lens_m3, sphere_prism_m3
-from sandmould.analysis.mesh_parts import mesh_below_m3, sphere_mesh_m3
 from sandmould.analysis.sections import solid_sections
 from sandmould.analysis.tube_fill import tube_fill
 from sandmould.geometry.geometry import Block, Scene

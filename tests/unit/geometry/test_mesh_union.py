@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
 
-from sandmould.analysis.mesh_parts import sphere_mesh_m3
+from sandmould.analysis.free_space import sphere_mesh_m3
 from sandmould.casting.arpm.raster import painted
 from sandmould.geometry.drawing_file import MeshFileError
 from sandmould.geometry.geometry import Block

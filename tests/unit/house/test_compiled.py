@@ -54,15 +54,14 @@ def printed(house: Path, script: str, *given: str) -> str:
 DEM = """
 import numpy as np
 from sandmould.dem.contact_law import Law
-from sandmould.dem.kinds import _pair_up
+from sandmould.dem.moving_state import _pair_up
 table = np.zeros((1, 1, 3))
 _pair_up(np.ones(1), np.array([2.0]), Law(1.0, 1.0, 0.0, 0.5, 0.0, 0.0, True, False), table)
 print(table[0, 0, 0])
 """
 ARPM = """
 import numpy as np
-from sandmould.casting.arpm.marching import HeatSystem
-from sandmould.casting.arpm.super_steps import _stage
+from sandmould.casting.arpm.marching import HeatSystem, _stage
 none = np.zeros(0, np.int64)
 rows = np.array([[1.0, 9.0, 9.0, 9.0, 9.0]])
 system = HeatSystem(none, none.astype(np.int32), np.zeros(0), np.zeros(1, np.int64), rows, 1.0)
@@ -249,8 +248,8 @@ def test_without_such_a_folder_nothing_is_kept(house: Path, of_others: bool) -> 
     else:
         place.write_text("a file")
     script = (
-        "from numba.core.caching import NullCache; from sandmould.casting.arpm import super_steps;"
-        "print(isinstance(super_steps._stage._cache, NullCache))"
+        "from numba.core.caching import NullCache; from sandmould.casting.arpm import marching;"
+        "print(isinstance(marching._stage._cache, NullCache))"
     )
     assert printed(house, script) == "True"
 

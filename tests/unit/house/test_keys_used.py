@@ -68,7 +68,7 @@ STUDIES = (
     "config/studies", "config/scenarios", "config/materials", "benchmarks/reliability/studies",
 )  # fmt: skip
 HOUSE = ("sandmould", "analysis", "pattern_fe", "templates")
-ABOUT_KEYS = ("reference/keys.py", "reference/schema.py", "scenario/moved_keys.py")
+ABOUT_KEYS = ("reference/keys.py", "reference/schema.py", "scenario/standing_keys.py")
 """Code that speaks of keys and reads none."""
 
 

@@ -17,7 +17,7 @@ HOUSES = ("sandmould.analysis.", "sandmould.kinds.")
 COMPUTES = "sandmould.kinds.deck.own."
 """What renders and runs a deck of the user's own, whose log has the measures."""
 DRAW_OR_DESCRIBE = (
-    "plots", "flow_plots", "freezing_plots", "export", "bent_files", "kind", "measures",
+    "plots", "casting_plots", "export", "bent_files", "kind", "measures",
 )  # fmt: skip
 """Files that change no number of a measure."""
 

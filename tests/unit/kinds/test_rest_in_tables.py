@@ -8,8 +8,7 @@ import numpy as np
 import pandas as pd
 import pytest
 
-from sandmould.engines.snapshot import Snapshot
-from sandmould.engines.snapshot_file import stored_snapshots
+from sandmould.engines.snapshot import Snapshot, stored_snapshots
 from sandmould.kinds.sand.measure import write_measures
 from sandmould.kinds.sand.moments import list_moments, nearest
 from sandmould.report.curves import time_chart

@@ -20,13 +20,13 @@ from matplotlib.figure import Figure
 from PIL import Image
 
 from sandmould import ROOT
-from sandmould.analysis.freezing import freezing
-from sandmould.analysis.freezing_plots import (
+from sandmould.analysis.casting_plots import (
     draw_freezing,
     draw_modulus,
     draw_niyama,
     draw_temperature,
 )
+from sandmould.analysis.freezing import freezing
 from sandmould.bad_input import BadInputError
 from sandmould.casting.arpm import computation
 from sandmould.execution.simulate import export_run, measure_run, render_run, simulate

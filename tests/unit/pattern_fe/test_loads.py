@@ -11,11 +11,10 @@ from numpy.typing import NDArray
 
 from sandmould.geometry.mesh import signed_volumes_m3
 from sandmould.geometry.mesh_file import read_surface
-from sandmould.pattern_fe.distance import Distance, distance_from_drawing
 from sandmould.pattern_fe.export import write_stl, write_surface
 from sandmould.pattern_fe.loads import pressure_above_and_below_pa, vertex_pressure_pa
 from sandmould.pattern_fe.pattern import Pattern
-from sandmould.pattern_fe.perimeter import Perimeter
+from sandmould.pattern_fe.perimeter import Distance, Perimeter, distance_from_drawing
 from sandmould.pattern_fe.shapes import bar, mesh_of
 from tests.patterns import (
     FOOT,

@@ -13,8 +13,8 @@ from pydantic import ValidationError
 from skfem import MeshTet
 
 from sandmould.bad_input import BadInputError
+from sandmould.engines.program import StepCounts
 from sandmould.engines.snapshot import Snapshot, scene_at
-from sandmould.engines.step_counts import StepCounts
 from sandmould.kinds.sand.kind import SAND
 from sandmould.pattern_fe.coupling.foam_body import FoamBody
 from sandmould.pattern_fe.coupling.interface import with_surface

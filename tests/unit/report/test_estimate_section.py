@@ -16,8 +16,7 @@ from sandmould.report.page import write_report
 from sandmould.runs.manifest import read_manifest, save_manifest
 from sandmould.runs.outcome import Outcome, RunOutcome
 from sandmould.scenario.box import Box, Plate
-from sandmould.scenario.discharge import Discharge
-from sandmould.scenario.fill import Fill, Layer
+from sandmould.scenario.fill import Discharge, Fill, Layer
 from sandmould.scenario.scenario import Scenario
 from sandmould.study.calibration.run import write_calibration
 from sandmould.study.collect import collect

@@ -14,7 +14,7 @@ from sandmould.engines.program import build_program
 from sandmould.engines.session import EngineStop
 from sandmould.runs.outcome import Outcome
 from sandmould.scenario.checks.scene import problems
-from sandmould.scenario.discharge import FLOW_SETTLING
+from sandmould.scenario.fill import FLOW_SETTLING
 from sandmould.scenario.placement import (
     NOMINAL_FRACTION,
     filled_measure,

@@ -8,8 +8,7 @@ import pytest
 
 from sandmould.scenario.box import Box, Plate
 from sandmould.scenario.contact import Contact
-from sandmould.scenario.discharge import Discharge
-from sandmould.scenario.fill import Fill, Layer
+from sandmould.scenario.fill import Discharge, Fill, Layer
 from sandmould.scenario.hardness import bed_hardness, column_mode_hz, column_speed_m_s
 from sandmould.scenario.sand import Sand, SievePoint
 from sandmould.scenario.scenario import Scenario

@@ -9,7 +9,7 @@ import pytest
 import yaml
 
 from sandmould.bad_input import BadInputError
-from sandmould.scenario.moved_keys import holds_anyway, instead_of, removed_keys
+from sandmould.scenario.standing_keys import holds_anyway, instead_of, removed_keys
 from sandmould.study.plan.expand import expand
 from sandmould.study.plan.load_study import OpenStudy, open_study
 

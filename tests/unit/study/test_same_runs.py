@@ -361,7 +361,7 @@ def test_another_installation_computes_what_its_code_computes_otherwise(
     for file, was, now in (
         ("scenario/scenario.py", KEY, f"    more: int = 1\n{KEY}"),
         ("scenario/scenario.py", "\n        0.05, ", "\n        0.04, first=0.05, description="),
-        ("casting/mps/weight.py", LAST_IMPORT, f"{LAST_IMPORT}MORE = 1\n"),
+        ("casting/mps/particles.py", LAST_IMPORT, f"{LAST_IMPORT}MORE = 1\n"),
         ("analysis/tube_fill.py", LAST_IMPORT, f"{LAST_IMPORT}MORE = 1\n"),
     ):
         path = site / "sandmould" / file

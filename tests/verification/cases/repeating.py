@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 from scipy.spatial.transform import Rotation
 
-from sandmould.dem import chunks
+from sandmould.dem import moving_state
 from sandmould.dem.contact_law import Law
 from sandmould.dem.grains import Grains
 from sandmould.dem.motion import NONE, Damping
@@ -88,7 +88,7 @@ def restored_equals_straight(engine: str, dimension: int) -> Iterator[Measured]:
 @case("-", "0: the order of all sums is fixed", engines=("reference",))
 def two_threads_equal_one(engine: str, dimension: int) -> Iterator[Measured]:
     """The same grains in eight chunks on one and on two threads."""
-    usual, chunks.CHUNK = chunks.CHUNK, 7
+    usual, moving_state.CHUNK = moving_state.CHUNK, 7
     try:
         ends = []
         for threads in (1, 2):
@@ -100,7 +100,7 @@ def two_threads_equal_one(engine: str, dimension: int) -> Iterator[Measured]:
                 now = bench.advance(40 * WINDOW_S)
                 ends.append(np.hstack([now.position_m, now.velocity_m_s, now.spin_rad_s]))
     finally:
-        chunks.CHUNK = usual
+        moving_state.CHUNK = usual
     yield Measured(
         "largest difference", float(np.abs(ends[0] - ends[1]).max()), 0.0, 0.0, "m, m/s, rad/s"
     )

@@ -13,10 +13,10 @@ from sandmould.casting.mps.particles import (
     WALL_LAYERS,
     at_rest,
     lattice,
+    make_kernel,
     mould_around,
 )
 from sandmould.casting.mps.scheme import LiquidMetal, Scheme
-from sandmould.casting.mps.weight import make_kernel
 
 COLUMNS = 6
 """Of a channel along its flow, which is periodic: the fewest that a kernel allows."""

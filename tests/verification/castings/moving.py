@@ -20,10 +20,16 @@ import pandas as pd
 from sandmould.arrays import Flags, Floats
 from sandmould.casting.mps import computation
 from sandmould.casting.mps.flow import Flow, FlowGuard
-from sandmould.casting.mps.particles import FLUID, WALL_LAYERS, at_rest, lattice, mould_around
+from sandmould.casting.mps.particles import (
+    FLUID,
+    WALL_LAYERS,
+    at_rest,
+    lattice,
+    make_kernel,
+    mould_around,
+)
 from sandmould.casting.mps.scheme import G_M_S2, LiquidMetal, Scheme
 from sandmould.casting.mps.stability_measures import measure_flow
-from sandmould.casting.mps.weight import make_kernel
 from sandmould.scenario.casting.flow import MetalFlow
 
 SETTINGS = {

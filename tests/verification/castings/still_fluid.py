@@ -10,7 +10,9 @@ import numpy as np
 
 from sandmould.arrays import Floats
 from sandmould.casting.mps.flow import Flow, RunningCost
+from sandmould.casting.mps.particles import Kernel, weight_slope
 from sandmould.casting.mps.probes import History, Watch
+from sandmould.casting.mps.scene import COLUMNS, ROWS, SPACING_M, open_tank
 from sandmould.casting.mps.scheme import LiquidMetal, Scheme
 from sandmould.casting.mps.stability_measures import (
     COUNTS,
@@ -20,8 +22,6 @@ from sandmould.casting.mps.stability_measures import (
     rate_stability,
     still_hops,
 )
-from sandmould.casting.mps.tank import COLUMNS, ROWS, SPACING_M, open_tank
-from sandmould.casting.mps.weight import Kernel, weight_slope
 
 DEPTHS_M = (0.03, 0.05, 0.07)
 """Below the surface, at half the width: where the paper measures."""

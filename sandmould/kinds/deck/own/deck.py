@@ -10,8 +10,8 @@ from pathlib import Path
 from sandmould import SHIPPED
 from sandmould.bad_input import BadInputError, Problem, display_path
 from sandmould.digest import digest, file_digest
-from sandmould.engines.capabilities import Ranks
 from sandmould.engines.registry import engine_module
+from sandmould.engines.session import Ranks
 from sandmould.kinds.deck.own.template import MOST_CHARACTERS, names_in, rendered
 from sandmould.scenario.own_deck import CLOCK, RESERVED, OwnDeck
 

@@ -1,11 +1,13 @@
-"""Pictures of a casting: when each part of it froze, and how warm casting and mould are."""
+"""Pictures of castings: when each part froze, how warm casting and mould are, how metal flows."""
 
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass
 
 import numpy as np
 from matplotlib.axes import Axes
+from matplotlib.collections import EllipseCollection
 from numpy.typing import NDArray
 
 from sandmould.analysis.feeding import NIYAMA_LOW, owner_grid
@@ -19,6 +21,7 @@ MOST_SPOTS = 12
 _INK, _CAST, _SAND = "#222222", "#B9BEC4", "#F1E5CC"
 _PLACES = 240
 """Along each side of a picture, at which that distance is asked for to draw an outline."""
+WALL_COLOUR = "#bbbbbb"
 
 
 def draw_freezing(
@@ -116,12 +119,8 @@ def _draw_outlines(
 def draw_part(low_m: Array, high_m: Array, at_m: float, axes: Axes, distance_m: DistanceM) -> None:
     """Draw what is cast in its box before anything runs, in 3D where a plane cuts it.
 
-    Parameters
-    ----------
-    low_m, high_m : (d,) float64, m
-        Corners of the box.
-    at_m : float, m
-        In 3D, y of the plane of x and z.
+    ``low_m``, ``high_m``, (d,) float64, m: corners of the box. ``at_m``: in 3D, y of the plane of x
+    and z.
     """
     axis = 1 if len(low_m) == 3 else 2
     kept = [each for each in range(len(low_m)) if each != axis]
@@ -146,11 +145,8 @@ def _section(
 
 
 def _cut(fields: Mapping[str, Array], freezing: Freezing) -> tuple[dict[str, Array], int, float]:
-    """Elements of 3D that a plane through the last point to freeze cuts; all of 2D.
-
-    Of the three planes the one with most of the casting; given with its normal's number and where
-    it lies, in m.
-    """
+    """Elements of 3D that a plane through the last point to freeze cuts; all of 2D."""
+    # Of the three planes that with most of the casting; its normal's number, its place in m.
     position_m, half_m = fields["position_m"], 0.5 * fields["size_m"]
     if position_m.shape[1] == 2:
         return dict(fields), 2, np.nan
@@ -169,7 +165,6 @@ def _cut(fields: Mapping[str, Array], freezing: Freezing) -> tuple[dict[str, Arr
 
 
 def _flat(place_m: Array, axis: int) -> Array:
-    """Places without one of three coordinates."""
     return np.delete(place_m, axis, axis=1) if place_m.shape[1] == 3 else place_m
 
 
@@ -204,3 +199,64 @@ def _grid(position_m: Array, size_m: Array, values: Array) -> tuple[Array, Array
     owner, low_m = owner_grid(position_m, size_m)
     grid = np.where(owner >= 0, values[owner], np.nan)
     return grid, low_m, low_m + float(size_m.min()) * np.array(owner.shape)
+
+
+@dataclass(frozen=True)
+class Frame:
+    """Metal at one record, as far as it is seen."""
+
+    time_s: float
+    place_m: Array
+    """(n, 2) float64, m: across and up."""
+    pressure_pa: Array
+    """(n,) float64, Pa."""
+
+
+def frame_of(fields: Mapping[str, Array], number: int) -> Frame:
+    """One record of ``fields.npz``, of a casting in space a slice through its axis."""
+    ends = np.cumsum(fields["count"])
+    own = slice(int(ends[number] - fields["count"][number]), int(ends[number]))
+    place, pressure = fields["position_m"][own], fields["pressure_pa"][own]
+    seen = _in_slice(fields, place)
+    return Frame(float(fields["time_s"][number]), place[seen][:, [0, -1]], pressure[seen])
+
+
+def _in_slice(fields: Mapping[str, Array], place_m: Array) -> NDArray[np.bool_]:
+    """What a picture shows: all of the plane, one layer of particles in space."""
+    if place_m.shape[1] == 2:
+        return np.ones(len(place_m), dtype=bool)
+    size_m = float(fields["particle_m"])
+    return np.asarray((place_m[:, 1] > 0.0) & (place_m[:, 1] <= size_m))
+
+
+def draw_frame(
+    fields: Mapping[str, Array], frame: Frame, axes: Axes, highest_pa: float
+) -> EllipseCollection:
+    """Draw mould and metal, particles as circles coloured by pressure; for a colour bar.
+
+    ``fields``: arrays of ``fields.npz``. ``highest_pa``: upper end of the colours; their lower end
+    is 0.
+    """
+    wall = fields["wall_m"]
+    wall = wall[_in_slice(fields, wall)][:, [0, -1]]
+    size_mm = 1e3 * float(fields["particle_m"])
+    for place, colour in ((wall, WALL_COLOUR), (frame.place_m, None)):
+        discs = EllipseCollection(
+            size_mm, size_mm, 0.0, units="xy", offsets=1e3 * place,
+            offset_transform=axes.transData, facecolor=colour,
+        )  # fmt: skip
+        axes.add_collection(discs)
+    discs.set_array(frame.pressure_pa)
+    discs.set_clim(0.0, highest_pa)
+    low, high = 1e3 * wall.min(axis=0) - size_mm, 1e3 * wall.max(axis=0) + size_mm
+    axes.set(xlim=(low[0], high[0]), ylim=(low[1], high[1]), aspect="equal")
+    return discs
+
+
+def draw_last(fields: Mapping[str, Array], axes: Axes, highest_pa: float) -> None:
+    """Draw the last record with its scale; arguments as ``draw_frame``."""
+    last = frame_of(fields, len(fields["count"]) - 1)
+    discs = draw_frame(fields, last, axes, highest_pa)
+    figure = axes.figure
+    figure.colorbar(discs, ax=axes, label="pressure, Pa", shrink=0.85, extend="max")
+    axes.set(xlabel="x, mm", ylabel="height, mm", title=f"{last.time_s:.3g} s")
