@@ -246,7 +246,8 @@ def test_what_does_not_scatter_is_told_where_the_runs_do() -> None:
     found = answered.answered(summary, "drive_acceleration_g", [HZ], "smaller")
     assert found.decided is Decided.BEST_AT_END
     # where nothing differs between runs, their seeds may not reach the sand
-    alone = answered.answered(summary.drop(columns="solid_fraction"), "drive_acceleration_g", [HZ], "smaller")
+    by_itself = summary.drop(columns="solid_fraction")
+    alone = answered.answered(by_itself, "drive_acceleration_g", [HZ], "smaller")
     assert alone.decided is Decided.OPEN
 
 
