@@ -22,7 +22,7 @@ from sandmould.study.plan.build_plan import open_plan
 from tests.workflow.pages import PAGES, blocks
 
 NOT_TYPED = {
-    "make demo": "ten minutes",
+    "make demo": "a quarter of an hour",
     "make test": "it is what runs this test",
     "sandmould demo --quick": "test_wheel.py runs it",
     "sandmould again frequency_20_r1_45f4dc": "is again RUN of another page, which is typed",
