@@ -113,8 +113,7 @@ def filled_space(measure: str) -> str:
 def unit_of(key: str) -> str:
     """Unit that a key's suffix states; empty for a pure number."""
     of_list = _PLACE.sub("", key)
-    of_section = of_list.rpartition(".")[0]  # as initial_k.casting
-    for name in (of_list, of_section if of_section.endswith("_k") else ""):
+    for name in (of_list, of_list.rpartition(".")[0]):  # of the section, as initial_k.casting
         for suffix, unit in _UNITS:
             if name.endswith(suffix):
                 return unit

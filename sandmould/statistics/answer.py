@@ -10,6 +10,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field
 from enum import StrEnum
 
+from sandmould.runs.formatting import FILL, OF_BED
 from sandmould.scenario.drive import BoxDrive
 from sandmould.statistics.config import Aim, Better, Goal
 from sandmould.statistics.over_time import Passage
@@ -31,7 +32,8 @@ CRUSHED = "pattern_crushed_fraction"
 MOST_QUARTERS = 16
 """Quarters of the vibration, four times as long, after which longer is no advice (argued)."""
 NEARLY_EMPTY = 0.05
-"""Share of what fits below which a few grains are all that a space holds (argued)."""
+"""Share of what fits below which a few grains are all that a space holds; of another share's target
+that which is next to nothing (argued)."""
 
 
 class Decided(StrEnum):
@@ -272,10 +274,12 @@ class Answer:
     @property
     def nearly_empty(self) -> bool:
         """Whether a share that should be large is next to nothing at the best setting."""
-        goal, best = self.asked.goal, self.best
-        is_share = self.asked.measure.endswith("_fraction") and self.asked.better == "larger"
+        goal, best, measure = self.asked.goal, self.best, self.asked.measure
+        is_share = measure.endswith("_fraction") and self.asked.better == "larger"
         if goal is None or best is None or not is_share:
             return False
+        is_fill = measure.endswith((FILL, OF_BED))
+        least = min(NEARLY_EMPTY, goal.value) if is_fill else NEARLY_EMPTY * goal.value
         misses = self.decided in (Decided.NONE_REACHES, Decided.EQUAL, Decided.NO_EFFECT)
         share = self.shares.get(best.label, best).mean
-        return misses and share < min(NEARLY_EMPTY, goal.value)
+        return misses and share < least

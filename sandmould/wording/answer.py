@@ -301,8 +301,7 @@ class AnswerWords:
         goal = self.answer.asked.goal
         if goal is None or not goal.measure.endswith(OF_BED):
             return "" if goal is None else f" to {self.target}"
-        least = f" to at least {100 * goal.value:.3g} % of what fits"
-        return "" if goal.value == FULL_SHARE else least
+        return "" if goal.value == FULL_SHARE else f" to at least {self.goal_text}"
 
     @property
     def certainty(self) -> str:

@@ -102,7 +102,14 @@ def test_an_interval_at_the_end_of_the_sweep_is_not_resolved(tmp_path: Path) -> 
     assert said.startswith("The best is near 1")
     assert "beyond the highest" in said
     assert not is_sound
-    assert "a frequency above" in optimum_steps(study, pages.optimum, None)[0].text
+    of_bed = 1.25 * found.summary["tube_fill_fraction"]
+    known = found.summary.assign(tube_fill_of_bed_fraction=of_bed)
+    said, _ = optimum_headline(pages, None, answer, known, has_speed=False)
+    share = f"{125 * pages.optimum.value[0]:.0f} %"
+    assert said.endswith(f"There the tube holds about {share} of what fits: it is not full.")
+    narrow = study.refine.model_copy(update={"interval": {KEY: 0.1}})
+    (step,) = optimum_steps(study.model_copy(update={"refine": narrow}), pages.optimum, None)
+    assert "a frequency above" in step.text
 
 
 def test_an_interval_over_most_of_the_sweep_names_no_best(tmp_path: Path) -> None:

@@ -279,9 +279,13 @@ def test_a_falling_measure_reaches_its_target_at_the_pace_that_it_fell() -> None
 def test_nothing_beyond_the_sweep_is_advised_where_next_to_nothing_was_reached() -> None:
     filled = {20: (0.0, 0.001, 0.0), 30: (0.004, 0.005, 0.006)}
     asked = Asked("both_fraction", "larger", (HZ,), Goal("both_fraction", 0.95))
-    found = decide(asked, Evidence(table(HZ, both_fraction=filled)))
+    evidence = Evidence(table(HZ, both_fraction=filled))
+    found = decide(asked, evidence)
     assert found.ends
     assert not found.beyond
+    # of a target as small it is much
+    near = decide(replace(asked, goal=Goal("both_fraction", 0.01)), evidence)
+    assert near.beyond == near.ends != ()
     assert resolution_among(["exchange", "element_m"]) == "element_m"
 
 

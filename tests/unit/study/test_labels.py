@@ -83,6 +83,13 @@ def test_a_list_of_small_sections_is_read_as_it_is_said() -> None:
     assert setting_text({"shapes": [{"at_m": [1, 2]}]}) == 'shapes [{"at_m": [1, 2]}]'
 
 
+def test_switches_and_stiff_springs_read_as_they_are_written() -> None:
+    assert setting_text({"values.periodic": True}) == "periodic true"
+    assert setting_text({"values.periodic": np.bool_(False)}) == "periodic false"
+    assert setting_text({"contact.normal_stiffness_n_m": 6e4}) == "60 kN/m"
+    assert setting_text({"values.load_pa": 4349.0}) == "4349 Pa"
+
+
 def test_sections_and_places_are_told_with_what_they_state() -> None:
     supports = {"clamped": [], "resting": ["bottom"], "hung": [{"low_m": [0.084, 0.047]}],
                 "bedding_n_m3": 3e6, "free": None}  # fmt: skip

@@ -181,6 +181,14 @@ def test_how_long_it_shakes_is_told_once_where_that_is_swept() -> None:
     assert said.strip().endswith("fill the pocket (95 % of what fits, or more).")
 
 
+def test_a_time_that_is_swept_is_no_time_in_which_none_fills() -> None:
+    key = "vibration.0.duration_s"
+    summary = answered.table(key, **{answered.POCKET: {0.5: (0.3, 0.35), 1.0: (0.5,)}})
+    curves = answered.over_a_second(summary, 0.0, answered.POCKET)
+    said = first_sentence(answered.answered(summary, answered.POCKET, [key], curves=curves))
+    assert "fills the pocket: the best, 50 % of what fits by one run, is at 1 s" in said
+
+
 def test_a_margin_of_what_is_no_share_is_told_however_wide() -> None:
     summary = answered.table(
         answered.HZ, height_mm={30: (440, 450), 45: (460, 470), 60: (480, 490)}
